@@ -1,2 +1,117 @@
-//! Set-up and the commands of the README.
-fn main() {}
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|bench`.
+
+mod bench;
+mod libtorch;
+mod prerequisites;
+mod process;
+mod venv;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  setup [--test]   make what is missing: the libtorch view (one download of
+                   543 MB), and with --test the Python environment of the tests
+  test [ARGS…]     set up, then run every test of the workspace; ARGS go to
+                   `cargo test`
+  mission [ARGS…]  set up, build, and fly one mission; ARGS go to `swath launch`
+                   (--help shows them)
+  bench            run every crate's measurements and print one JSON object
+";
+
+fn main() -> ExitCode {
+    let args: Vec<OsString> = std::env::args_os().skip(1).collect();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &[OsString]) -> Result<()> {
+    let root = repository_root()?;
+    let Some((command, rest)) = args.split_first() else {
+        bail!("no command given\n\n{USAGE}");
+    };
+    match command.to_str() {
+        Some("setup") => setup(&root, with_tests(rest)?),
+        Some("test") => test(&root, rest),
+        Some("mission") => mission(&root, rest),
+        Some("bench") => bench(&root, rest),
+        Some("help" | "--help" | "-h") => {
+            eprint!("{USAGE}");
+            Ok(())
+        }
+        _ => bail!("there is no command {}\n\n{USAGE}", command.display()),
+    }
+}
+
+fn with_tests(args: &[OsString]) -> Result<bool> {
+    match args {
+        [] => Ok(false),
+        [flag] if flag == "--test" => Ok(true),
+        _ => bail!("setup takes no argument but --test\n\n{USAGE}"),
+    }
+}
+
+fn setup(root: &Path, tests: bool) -> Result<()> {
+    prerequisites::check()?;
+    let _lock = process::lock(root)?;
+    libtorch::ensure(root)?;
+    if tests {
+        venv::ensure(root)?;
+    }
+    Ok(())
+}
+
+/// Runs every test in the development profile: one build serves all of them.
+fn test(root: &Path, args: &[OsString]) -> Result<()> {
+    setup(root, true)?;
+    let mut cargo = process::cargo(root, "test");
+    cargo.arg("--workspace").args(args);
+    cargo.env("SWATH_PYTHON", venv::python(root));
+    process::run(&mut cargo)
+}
+
+/// Builds all nodes, then becomes `swath launch`.
+fn mission(root: &Path, args: &[OsString]) -> Result<()> {
+    setup(root, false)?;
+    process::run(process::cargo(root, "build").args([
+        "--quiet",
+        "--release",
+        "--package",
+        "swath-nodes",
+        "--bins",
+    ]))?;
+    let mut cargo = process::cargo(root, "run");
+    cargo.args(["--quiet", "--release", "--package", "swath-nodes"]);
+    cargo.args(["--bin", "swath", "--", "launch"]).args(args);
+    Err(process::become_command(&mut cargo))
+}
+
+fn bench(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("bench takes no arguments\n\n{USAGE}");
+    }
+    setup(root, false)?;
+    bench::run(root)
+}
+
+fn repository_root() -> Result<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    let root = folder.context("the xtask folder has no parent")?;
+    if !root.join("Cargo.toml").is_file() {
+        bail!(
+            "{} holds no Cargo.toml: build xtask again where the repository is now",
+            root.display()
+        );
+    }
+    Ok(root.to_path_buf())
+}
