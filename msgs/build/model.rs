@@ -1,0 +1,100 @@
+//! What a ROS 2 interface file holds, once parsed.
+
+/// A type that is not made of others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Primitive {
+    Bool,
+    Byte,
+    Char,
+    Int8,
+    Uint8,
+    Int16,
+    Uint16,
+    Int32,
+    Uint32,
+    Int64,
+    Uint64,
+    Float32,
+    Float64,
+    /// A text, with the most bytes it may have.
+    String {
+        bound: Option<usize>,
+    },
+}
+
+/// The type of a field without its array part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Base {
+    Primitive(Primitive),
+    Nested { package: String, name: String },
+}
+
+/// The array part of a field's type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    Scalar,
+    Array(usize),
+    Bounded(usize),
+    Unbounded,
+}
+
+/// A default or a constant's value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    Bool(bool),
+    Int(i128),
+    Float(f64),
+    Text(String),
+    List(Vec<Value>),
+}
+
+/// A field of a message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    pub name: String,
+    pub base: Base,
+    pub shape: Shape,
+    pub default: Option<Value>,
+    pub doc: String,
+}
+
+/// A named value that goes with a message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constant {
+    pub name: String,
+    pub primitive: Primitive,
+    pub value: Value,
+    pub doc: String,
+}
+
+/// A message, or the request or response of a service.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    pub package: String,
+    /// Name within the package; `Name_Request` or `Name_Response` for the halves of a service.
+    pub name: String,
+    /// Folder of the file that defines it: `msg` or `srv`.
+    pub kind: &'static str,
+    pub doc: String,
+    pub fields: Vec<Field>,
+    pub constants: Vec<Constant>,
+    /// The definition as it is written in the file.
+    pub text: String,
+}
+
+impl Message {
+    /// Name as ROS 2 writes it: `package/msg/Name`.
+    pub fn type_name(&self) -> String {
+        format!("{}/{}/{}", self.package, self.kind, self.name)
+    }
+}
+
+/// A service.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Service {
+    pub package: String,
+    pub name: String,
+    pub doc: String,
+    pub request: Message,
+    pub response: Message,
+}
