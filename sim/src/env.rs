@@ -1,0 +1,306 @@
+//! The semi-MDP environment (paper, section III): one step is one task, spent in full.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::catalogue::{Candidate, Catalogue};
+use crate::error::SimError;
+use crate::flight::{Flight, Situation};
+use crate::guidance::{FailureReason, Task, TaskOutcome};
+use crate::model::Model;
+use crate::observation::{ObservationSet, observe};
+use crate::planner::{Decision, DecisionContext, Planner, PlannerError};
+use crate::rng;
+use crate::scenario::{InitialState, ScenarioConfig};
+use crate::strip::{StripId, StripRequest};
+use crate::time::Tick;
+
+/// An episode: how long, and what is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EpisodeConfig {
+    /// Length [orbits].
+    pub orbits: f64,
+    /// Distribution of the requests.
+    pub scenario: ScenarioConfig,
+}
+
+impl Default for EpisodeConfig {
+    fn default() -> Self {
+        Self { orbits: 6.0, scenario: ScenarioConfig::default() }
+    }
+}
+
+impl EpisodeConfig {
+    /// The paper's evaluation: 24 h, which it counts as 15 orbits, with 2000 to 5000 strips.
+    #[must_use]
+    pub fn evaluation() -> Self {
+        Self { orbits: 15.0, scenario: ScenarioConfig { count: [2000, 5000], ..ScenarioConfig::default() } }
+    }
+
+    /// Checks the length and the scenario.
+    ///
+    /// # Errors
+    /// The first setting that is out of range.
+    pub fn validate(&self) -> Result<(), SimError> {
+        crate::config::in_range("orbits", self.orbits, 0.01, 10_000.0)?;
+        self.scenario.validate()
+    }
+}
+
+/// How far past the episode's end windows are sought [orbits], so that its end cannot be seen in the observation.
+const WINDOW_MARGIN_ORBITS: f64 = 1.5;
+
+/// A task as it was flown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TaskRecord {
+    /// Number of the task, from 0.
+    pub task: u64,
+    /// Tick at which it began.
+    pub start: Tick,
+    /// Tick at which it ended.
+    pub end: Tick,
+    /// The strip, or `None` for a wait.
+    pub strip: Option<StripId>,
+    /// Transition time T_pre [ticks]; 0 for a wait.
+    pub t_pre: u32,
+    /// Acquisition time T_acq [ticks]; 0 for a wait.
+    pub t_acq: u32,
+    /// How it went.
+    pub outcome: TaskOutcome,
+    /// The strip's priority when this fulfilled it, else 0.
+    pub reward: f64,
+}
+
+impl TaskRecord {
+    /// Whether a strip was imaged.
+    #[must_use]
+    pub fn success(&self) -> bool {
+        self.strip.is_some() && self.outcome.failure.is_none()
+    }
+
+    /// Length [ticks].
+    #[must_use]
+    pub fn ticks(&self) -> u32 {
+        self.end.since(self.start) as u32
+    }
+}
+
+/// What came of a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepOutcome {
+    /// The task.
+    pub record: TaskRecord,
+    /// Whether the episode's length is reached. The episode does not end there for the learner: bootstrap.
+    pub truncated: bool,
+}
+
+/// The environment: a satellite, a catalogue and a clock.
+#[derive(Clone, Debug)]
+pub struct Env {
+    model: Arc<Model>,
+    flight: Flight,
+    catalogue: Catalogue,
+    horizon: Tick,
+    task: u64,
+    situation: Situation,
+    candidates: Vec<Candidate>,
+}
+
+impl Env {
+    /// An environment at the epoch with an empty catalogue, ending at `horizon`.
+    #[must_use]
+    pub fn new(model: Arc<Model>, initial: &InitialState, horizon: Tick) -> Self {
+        let mut flight = Flight::new(&model, &model, initial);
+        let margin = flight.spacecraft.orbit.period_s() * WINDOW_MARGIN_ORBITS;
+        let windows_until = horizon.after(model.period.ticks_ceil(margin));
+        let catalogue = Catalogue::new(&model, &flight.spacecraft.orbit, windows_until);
+        let situation = flight.situation();
+        Self { model, flight, catalogue, horizon, task: 0, situation, candidates: Vec::new() }
+    }
+
+    /// An episode drawn from a seed: initial state, number of strips and strips.
+    #[must_use]
+    pub fn episode(model: Arc<Model>, config: &EpisodeConfig, seed: u64) -> Self {
+        let initial = InitialState::draw(&model.config, &mut rng::stream(seed, rng::INITIAL_STATE));
+        let mut rng = rng::stream(seed, rng::CATALOGUE);
+        let count = config.scenario.draw_count(&mut rng);
+        let requests = config.scenario.generate(&mut rng, count, model.config.earth.radius_m);
+        let horizon = horizon(&model, config.orbits);
+        let mut env = Self::new(model, &initial, horizon);
+        env.catalogue.add_all(&env.model, &requests, Tick(0));
+        env.refresh();
+        env
+    }
+
+    /// Adds requests at the present decision. Each one's identity or refusal, in order.
+    pub fn submit(&mut self, requests: &[StripRequest]) -> Vec<Result<StripId, crate::error::StripError>> {
+        let now = self.now();
+        let results = requests.iter().map(|request| self.catalogue.add(&self.model, request, now)).collect();
+        self.refresh();
+        results
+    }
+
+    /// What the next decision rests on.
+    #[must_use]
+    pub fn context(&self) -> DecisionContext<'_> {
+        DecisionContext {
+            task: self.task,
+            situation: &self.situation,
+            candidates: &self.candidates,
+            model: &self.model,
+        }
+    }
+
+    /// The observation of the next decision; see [`observe`].
+    pub fn observe(&self, set: ObservationSet, features: &mut [f32], mask: &mut [bool]) {
+        observe(&self.context(), set, features, mask);
+    }
+
+    /// Simulated time.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.flight.now()
+    }
+
+    /// Tick at which the episode ends.
+    #[must_use]
+    pub fn horizon(&self) -> Tick {
+        self.horizon
+    }
+
+    /// Whether the episode's length is reached.
+    #[must_use]
+    pub fn truncated(&self) -> bool {
+        self.now() >= self.horizon
+    }
+
+    /// The strips.
+    #[must_use]
+    pub fn catalogue(&self) -> &Catalogue {
+        &self.catalogue
+    }
+
+    /// The constants.
+    #[must_use]
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Flies one task in full, also past the horizon: the step of the learner.
+    ///
+    /// # Errors
+    /// When the decision is not one that the context allows; nothing is flown then.
+    pub fn step(&mut self, decision: Decision) -> Result<StepOutcome, PlannerError> {
+        self.fly(decision, Tick(u64::MAX))
+    }
+
+    /// Flies one task, cut short at the horizon: the step of a mission.
+    ///
+    /// # Errors
+    /// When the decision is not one that the context allows; nothing is flown then.
+    pub fn step_to_horizon(&mut self, decision: Decision) -> Result<StepOutcome, PlannerError> {
+        self.fly(decision, self.horizon)
+    }
+
+    /// Decides and flies until the horizon, handing each task's record to `each`.
+    ///
+    /// # Errors
+    /// The first error of the planner.
+    pub fn run(
+        &mut self,
+        planner: &mut dyn Planner,
+        mut each: impl FnMut(&TaskRecord),
+    ) -> Result<(), PlannerError> {
+        while !self.truncated() {
+            let decision = planner.decide(&self.context())?;
+            each(&self.step_to_horizon(decision)?.record);
+        }
+        Ok(())
+    }
+
+    fn fly(&mut self, decision: Decision, until: Tick) -> Result<StepOutcome, PlannerError> {
+        let context = self.context();
+        let task = decision.to_task(&context)?;
+        let strip = match decision {
+            Decision::Image { candidate, .. } => Some(context.candidates[candidate].id),
+            Decision::Wait { .. } => None,
+        };
+        let (t_pre, t_acq) = match task {
+            Task::Image { t_pre, t_acq, .. } => (t_pre, t_acq),
+            Task::Wait { .. } => (0, 0),
+        };
+        let start = self.now();
+        let outcome = self.flight.fly(task, until);
+        let reward = match (strip, outcome.failure) {
+            (Some(id), None) => self.catalogue.fulfil(id).unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let record = TaskRecord { task: self.task, start, end: self.now(), strip, t_pre, t_acq, outcome, reward };
+        self.task += 1;
+        self.refresh();
+        Ok(StepOutcome { record, truncated: self.truncated() })
+    }
+
+    fn refresh(&mut self) {
+        self.situation = self.flight.situation();
+        let count = self.model.config.planning.candidates;
+        self.catalogue.next(self.situation.now, count, &mut self.candidates);
+    }
+}
+
+/// Tick at which a mission of a number of orbits ends.
+#[must_use]
+pub fn horizon(model: &Model, orbits: f64) -> Tick {
+    let radius = model.config.earth.radius_m + model.config.orbit.altitude_km * 1e3;
+    let period_s = std::f64::consts::TAU * (radius * radius * radius / model.config.earth.mu_m3_s2).sqrt();
+    Tick((orbits * period_s / model.period.seconds()).round() as u64)
+}
+
+/// Totals over the tasks of a mission.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Totals {
+    /// Tasks that tried to image a strip and were not cut short.
+    pub attempts: u64,
+    /// Strips imaged.
+    pub fulfilled: u64,
+    /// Sum of the priorities of the strips imaged.
+    pub reward: f64,
+    /// Ticks spent on transitions of attempts.
+    pub t_pre_ticks: u64,
+    /// Ticks spent imaging in attempts.
+    pub t_acq_ticks: u64,
+    /// Ticks spent waiting.
+    pub wait_ticks: u64,
+    /// Attempts that failed for attitude.
+    pub failed_attitude: u64,
+    /// Attempts that failed for elevation.
+    pub failed_elevation: u64,
+}
+
+impl Totals {
+    /// Counts a task.
+    pub fn add(&mut self, record: &TaskRecord) {
+        self.reward += record.reward;
+        if record.strip.is_none() {
+            self.wait_ticks += u64::from(record.ticks());
+            return;
+        }
+        match record.outcome.failure {
+            Some(FailureReason::Interrupted) => return,
+            Some(FailureReason::Attitude) => self.failed_attitude += 1,
+            Some(FailureReason::Elevation) => self.failed_elevation += 1,
+            None => self.fulfilled += 1,
+        }
+        self.attempts += 1;
+        self.t_pre_ticks += u64::from(record.t_pre);
+        self.t_acq_ticks += u64::from(record.t_acq);
+    }
+
+    /// Share of the attempts that succeeded; NaN without attempts.
+    #[must_use]
+    pub fn success_rate(&self) -> f64 {
+        self.fulfilled as f64 / self.attempts as f64
+    }
+}

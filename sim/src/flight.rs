@@ -1,0 +1,127 @@
+//! The closed loop in process: spacecraft and guidance, one tick after the other.
+
+use nalgebra::Vector3;
+
+use crate::dynamics::{BodyState, Plant};
+use crate::guidance::{Guidance, GuidanceTick, Task, TaskOutcome};
+use crate::model::Model;
+use crate::orbit::Orbit;
+use crate::scenario::InitialState;
+use crate::time::Tick;
+
+/// The spacecraft: it integrates what it is told.
+#[derive(Clone, Debug)]
+pub struct Spacecraft {
+    /// Orbit.
+    pub orbit: Orbit,
+    /// Attitude, rate and wheel speeds at `now`.
+    pub body: BodyState,
+    /// Simulated time.
+    pub now: Tick,
+    /// Torque that acted over the tick that ended at `now` [N m].
+    pub torque_applied: Vector3<f64>,
+    plant: Plant,
+}
+
+impl Spacecraft {
+    /// A spacecraft at the epoch.
+    #[must_use]
+    pub fn new(model: &Model, initial: &InitialState) -> Self {
+        Self {
+            orbit: Orbit::new(&model.config, initial.orbit, model.period),
+            body: initial.body,
+            now: Tick(0),
+            torque_applied: Vector3::zeros(),
+            plant: model.plant.clone(),
+        }
+    }
+
+    /// Integrates one tick under a torque command [N m], saturated as the wheels do it.
+    #[inline]
+    pub fn advance(&mut self, command: &Vector3<f64>) {
+        self.torque_applied = self.plant.saturate(command, &self.body.wheel_speed);
+        self.plant.step(&mut self.body, &self.torque_applied);
+        self.now = self.now.after(1);
+    }
+}
+
+/// What a planner may know of the satellite when it decides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Situation {
+    /// Simulated time.
+    pub now: Tick,
+    /// Position in N [m].
+    pub r_BN_N: Vector3<f64>,
+    /// Velocity in N [m/s].
+    pub v_BN_N: Vector3<f64>,
+    /// Attitude, rate and wheel speeds.
+    pub body: BodyState,
+    /// The servo's rate-error integral [rad].
+    pub servo_integral: Vector3<f64>,
+    /// Torque commanded one tick ago, which acts until the next tick [N m].
+    pub torque_pending: Vector3<f64>,
+}
+
+/// Spacecraft and guidance in one process, with the latency of one tick between them.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// The spacecraft.
+    pub spacecraft: Spacecraft,
+    /// Its guidance computer.
+    pub guidance: Guidance,
+    torque_pending: Vector3<f64>,
+}
+
+impl Flight {
+    /// A flight at the epoch. `plant_model` is what is flown, `guidance_model` what guidance believes.
+    #[must_use]
+    pub fn new(plant_model: &Model, guidance_model: &Model, initial: &InitialState) -> Self {
+        Self {
+            spacecraft: Spacecraft::new(plant_model, initial),
+            guidance: Guidance::new(guidance_model),
+            torque_pending: Vector3::zeros(),
+        }
+    }
+
+    /// Simulated time.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.spacecraft.now
+    }
+
+    /// What a planner may know now.
+    pub fn situation(&mut self) -> Situation {
+        let now = self.now();
+        Situation {
+            now,
+            r_BN_N: self.spacecraft.orbit.position(now),
+            v_BN_N: self.spacecraft.orbit.velocity(now),
+            body: self.spacecraft.body,
+            servo_integral: self.guidance.servo_integral,
+            torque_pending: self.torque_pending,
+        }
+    }
+
+    /// Flies a task to its end, or to `until` when that comes first; then the task counts as interrupted.
+    pub fn fly(&mut self, task: Task, until: Tick) -> TaskOutcome {
+        let start = self.now();
+        let end = start.after(task.ticks()).min(until);
+        self.guidance.start(task, start, &self.spacecraft.body);
+        while self.now() < end {
+            self.tick();
+        }
+        let r_BN_N = self.spacecraft.orbit.position(end);
+        self.guidance.finish(end, &r_BN_N, &self.spacecraft.body).unwrap_or(TaskOutcome::NOT_BEGUN)
+    }
+
+    /// One closed-loop tick: the command computed from this tick's state waits while the previous one acts.
+    #[inline]
+    pub fn tick(&mut self) -> GuidanceTick {
+        let spacecraft = &mut self.spacecraft;
+        let r_BN_N = spacecraft.orbit.position(spacecraft.now);
+        let tick = self.guidance.tick(spacecraft.now, &r_BN_N, &spacecraft.body);
+        spacecraft.advance(&self.torque_pending);
+        self.torque_pending = tick.torque;
+        tick
+    }
+}

@@ -1,0 +1,47 @@
+//! A configuration turned into SI constants, shared by everything that flies it.
+
+use crate::config::SimConfig;
+use crate::control::ControlLaw;
+use crate::dynamics::Plant;
+use crate::error::SimError;
+use crate::orbit::{Turn, earth_turn};
+use crate::time::TickPeriod;
+
+/// A validated configuration with what follows from it.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The configuration.
+    pub config: SimConfig,
+    /// Length of a control tick.
+    pub period: TickPeriod,
+    /// Body and wheels.
+    pub plant: Plant,
+    /// Steering law and servo.
+    pub law: ControlLaw,
+    /// The Earth's rotation angle.
+    pub earth: Turn,
+}
+
+impl Model {
+    /// Validates a configuration and derives its constants.
+    ///
+    /// # Errors
+    /// The first setting that is out of range.
+    pub fn new(config: SimConfig) -> Result<Self, SimError> {
+        config.validate()?;
+        let period = TickPeriod::from_frequency(config.control.frequency_hz)?;
+        Ok(Self {
+            plant: Plant::new(&config.spacecraft, period.seconds()),
+            law: ControlLaw::new(&config.control),
+            earth: earth_turn(&config, period),
+            period,
+            config,
+        })
+    }
+
+    /// Longest transition in whole ticks.
+    #[must_use]
+    pub fn t_pre_max(&self) -> u32 {
+        self.period.ticks_ceil(self.config.planning.t_pre_max_s)
+    }
+}
