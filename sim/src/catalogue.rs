@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::orbit::Orbit;
 use crate::error::StripError;
 use crate::model::Model;
+use crate::orbit::Orbit;
 use crate::strip::{Strip, StripId, StripRequest};
 use crate::time::Tick;
 use crate::windows::{Window, WindowFinder};
@@ -235,7 +235,9 @@ mod tests {
         for now in (0..172_800).step_by(5000).map(Tick) {
             catalogue.next(now, 40, &mut candidates);
             let expected = (1..=catalogue.len() as u64)
-                .filter_map(|id| catalogue.get(StripId(id))?.windows.iter().find(|w| w.close > now).map(|w| (w.close, id)))
+                .filter_map(|id| {
+                    catalogue.get(StripId(id))?.windows.iter().find(|w| w.close > now).map(|w| (w.close, id))
+                })
                 .collect::<BTreeSet<_>>();
             let found = candidates.iter().map(|c| (c.window.close, c.id.0)).collect::<Vec<_>>();
             assert_eq!(found, expected.into_iter().take(40).collect::<Vec<_>>());

@@ -127,8 +127,9 @@ mod tests {
         let at = law.steer(&sigma);
         let h = 1e-6;
         let sigma_dot = mrp::b_times(&sigma, &at.omega_star) * 0.25;
-        let difference =
-            (law.steer(&(sigma + sigma_dot * h)).omega_star - law.steer(&(sigma - sigma_dot * h)).omega_star) / (2.0 * h);
+        let difference = (law.steer(&(sigma + sigma_dot * h)).omega_star
+            - law.steer(&(sigma - sigma_dot * h)).omega_star)
+            / (2.0 * h);
         assert_relative_eq!(at.omega_star_prime, difference, epsilon = 1e-8);
     }
 }

@@ -208,11 +208,7 @@ impl Env {
     ///
     /// # Errors
     /// The first error of the planner.
-    pub fn run(
-        &mut self,
-        planner: &mut dyn Planner,
-        mut each: impl FnMut(&TaskRecord),
-    ) -> Result<(), PlannerError> {
+    pub fn run(&mut self, planner: &mut dyn Planner, mut each: impl FnMut(&TaskRecord)) -> Result<(), PlannerError> {
         while !self.truncated() {
             let decision = planner.decide(&self.context())?;
             each(&self.step_to_horizon(decision)?.record);

@@ -28,7 +28,9 @@ pub enum SimError {
         max: f64,
     },
     /// A control frequency whose period is no whole number of nanoseconds.
-    #[error("control frequency {frequency_hz} Hz is outside 0.1 to 100 Hz or its period is not a whole number of nanoseconds")]
+    #[error(
+        "control frequency {frequency_hz} Hz is outside 0.1 to 100 Hz or its period is not a whole number of nanoseconds"
+    )]
     Frequency {
         /// The frequency given [Hz].
         frequency_hz: f64,

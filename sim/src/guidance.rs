@@ -273,8 +273,7 @@ impl Guidance {
         self.active = Some(active);
         let error = TrackingError { sigma_BR, omega_BR_B };
         let integral = &mut self.servo_integral;
-        let command =
-            self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
+        let command = self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
         GuidanceTick { torque: self.plant.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
     }
 

@@ -76,13 +76,7 @@ impl Frame {
         }
     }
 
-    fn observe(
-        &mut self,
-        context: &DecisionContext<'_>,
-        candidate: &Candidate,
-        set: ObservationSet,
-        row: &mut [f32],
-    ) {
+    fn observe(&mut self, context: &DecisionContext<'_>, candidate: &Candidate, set: ObservationSet, row: &mut [f32]) {
         let (model, situation) = (context.model, context.situation);
         let now = situation.now;
         let radius = model.config.earth.radius_m;

@@ -67,11 +67,7 @@ impl StripRequest {
         let length_km = strip.arc * radius / 1e3;
         // The limit is meant for people: a metre of rounding is not a reason to refuse.
         if !(limits.length_min_km - 1e-3..=limits.length_max_km + 1e-3).contains(&length_km) {
-            return Err(StripError::Length {
-                length_km,
-                min_km: limits.length_min_km,
-                max_km: limits.length_max_km,
-            });
+            return Err(StripError::Length { length_km, min_km: limits.length_min_km, max_km: limits.length_max_km });
         }
         Ok(strip)
     }
@@ -89,8 +85,7 @@ impl StripRequest {
                 return Err(StripError::NotFinite { field, value });
             }
         }
-        for (field, value_deg) in
-            [("start latitude", self.start_latitude_deg), ("end latitude", self.end_latitude_deg)]
+        for (field, value_deg) in [("start latitude", self.start_latitude_deg), ("end latitude", self.end_latitude_deg)]
         {
             if !(-90.0..=90.0).contains(&value_deg) {
                 return Err(StripError::Latitude { field, value_deg });

@@ -243,11 +243,13 @@ mod tests {
     #[test]
     fn windows_are_those_found_by_looking_at_every_tick() {
         let model = Model::new(SimConfig::default()).unwrap();
-        let requests = ScenarioConfig::default().generate(&mut rng::stream(5, rng::CATALOGUE), 60, model.config.earth.radius_m);
+        let requests =
+            ScenarioConfig::default().generate(&mut rng::stream(5, rng::CATALOGUE), 60, model.config.earth.radius_m);
         let ticks = 43_200;
         let mut found = 0;
         for (i, request) in requests.iter().enumerate() {
-            let phase = OrbitPhase { raan_deg: 37.0 * i as f64 % 360.0, argument_of_latitude_deg: 91.0 * i as f64 % 360.0 };
+            let phase =
+                OrbitPhase { raan_deg: 37.0 * i as f64 % 360.0, argument_of_latitude_deg: 91.0 * i as f64 % 360.0 };
             let mut orbit = Orbit::new(&model.config, phase, model.period);
             let strip = request.to_strip(&model.config.requests, model.config.earth.radius_m).unwrap();
             let mut windows = Vec::new();

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use swath_sim::config::{RAD_S_PER_RPM, SimConfig};
 use swath_sim::control::TrackingError;
 use swath_sim::dynamics::BodyState;
-use swath_sim::guidance::{rate_error, reference_dcm};
+use swath_sim::guidance::reference_dcm;
 use swath_sim::model::Model;
 use swath_sim::mrp;
 use swath_sim::orbit::{Orbit, OrbitPhase, Turn, earth_to_inertial};
@@ -313,7 +313,9 @@ impl<'a> Run<'a> {
         }
         let (meta, strip) = &self.strips[self.active];
         let planet_tick = if self.meta.order == Order::Bskrl { Tick(self.tick.0.saturating_sub(1)) } else { self.tick };
-        let (target_E, scan_E) = strip.target_E(time - meta.t0 - meta.T_pre);
+        // Basilisk's target stops at the strip's end.
+        let elapsed = (time - meta.t0 - meta.T_pre).min(strip.acquisition_time_s());
+        let (target_E, scan_E) = strip.target_E(elapsed);
         let turn = self.earth.cos_sin(planet_tick);
         let target_N = earth_to_inertial(turn, &target_E) * self.meta.planetRadius;
         let mut scan_N = earth_to_inertial(turn, &scan_E);
@@ -334,7 +336,10 @@ impl<'a> Run<'a> {
                 sigma_BR = backward;
             }
         }
-        let omega_BR_B = self.previous_sigma.map_or(Vector3::zeros(), |previous| rate_error(&sigma_BR, &previous, dt));
+        // Basilisk reads a switch of MRP sets as a jump: plain difference, unlike `swath_sim::guidance::rate_error`.
+        let omega_BR_B = self
+            .previous_sigma
+            .map_or(Vector3::zeros(), |previous| mrp::rate_to_omega(&sigma_BR, &((sigma_BR - previous) / dt)));
         self.previous_sigma = Some(sigma_BR);
         TrackingError { sigma_BR, omega_BR_B }
     }

@@ -29,7 +29,10 @@ struct Args {
 fn main() -> Result<ExitCode> {
     let args = Args::parse();
     let mut within = true;
-    println!("{:<36} {:>6} {:>10} {:>12} {:>12} {:>12}", "file", "rows", "sigma", "omega rad/s", "command N m", "wheel rad/s");
+    println!(
+        "{:<36} {:>6} {:>10} {:>12} {:>12} {:>12}",
+        "file", "rows", "sigma", "omega rad/s", "command N m", "wheel rad/s"
+    );
     for path in &args.files {
         let history = history::read(path)?;
         // A slew from so far that it tumbles amplifies rounding: its first minute is the comparison.
