@@ -288,7 +288,7 @@ fn beyond_its_bound_nothing_is_written_or_read() {
 #[test]
 fn truncated_messages_are_errors() {
     let bytes = cdr(&StripStatus {
-        name: "delta".to_owned(),
+        client_ref: "delta".to_owned(),
         ..StripStatus::default()
     });
     for length in 0..bytes.len() {

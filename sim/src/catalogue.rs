@@ -75,11 +75,27 @@ impl Catalogue {
         }
     }
 
-    /// Adds a request that becomes known at `now`.
+    /// Adds a request that becomes known at `now`. A bidirectional one gets a linked twin, scanned the other way, with
+    /// the identity after its own; fulfilling either fulfils both.
     ///
     /// # Errors
     /// Why the request is refused; the catalogue is unchanged then.
     pub fn add(&mut self, model: &Model, request: &StripRequest, now: Tick) -> Result<StripId, StripError> {
+        let forward = self.add_one_way(model, request, now);
+        if !request.bidirectional {
+            return forward;
+        }
+        match (forward, self.add_one_way(model, &request.reversed(), now)) {
+            (Ok(id), Ok(twin)) => {
+                self.link(id, twin);
+                Ok(id)
+            }
+            (Ok(id), Err(_)) | (Err(_), Ok(id)) => Ok(id),
+            (Err(error), Err(_)) => Err(error),
+        }
+    }
+
+    fn add_one_way(&mut self, model: &Model, request: &StripRequest, now: Tick) -> Result<StripId, StripError> {
         let strip = request.to_strip(&model.config.requests, model.config.earth.radius_m)?;
         let mut windows = Vec::new();
         self.finder.find(&strip, now, self.horizon, &mut windows);
@@ -106,8 +122,7 @@ impl Catalogue {
         requests.iter().filter(|request| self.add(model, request, now).is_ok()).count()
     }
 
-    /// Links two strips: fulfilling either fulfils both.
-    pub fn link(&mut self, a: StripId, b: StripId) {
+    fn link(&mut self, a: StripId, b: StripId) {
         for (one, other) in [(a, b), (b, a)] {
             if let Some(entry) = self.entry_mut(one) {
                 entry.linked = Some(other);
@@ -257,9 +272,21 @@ mod tests {
 
     #[test]
     fn fulfilling_a_strip_fulfils_its_twin_and_pays_once() {
-        let (_, mut catalogue) = catalogue();
-        let (a, b) = (StripId(1), StripId(2));
-        catalogue.link(a, b);
+        let (model, mut catalogue) = catalogue();
+        let request = StripRequest {
+            start_latitude_deg: 10.0,
+            start_longitude_deg: 20.0,
+            end_latitude_deg: 12.0,
+            end_longitude_deg: 21.0,
+            priority: 0.5,
+            acquisition_speed_m_s: 3000.0,
+            bidirectional: true,
+        };
+        let a = catalogue.add(&model, &request, Tick(0)).unwrap();
+        let b = StripId(a.0 + 1);
+        let (forward, backward) = (catalogue.get(a).unwrap(), catalogue.get(b).unwrap());
+        assert_eq!((forward.linked, backward.linked), (Some(b), Some(a)));
+        assert!((forward.strip.end_E() - backward.strip.start_E).norm() < 1e-12);
         let pending = catalogue.pending();
         assert_eq!(catalogue.fulfil(a), Some(catalogue.get(a).unwrap().strip.priority));
         assert_eq!(catalogue.fulfil(a), None);

@@ -105,18 +105,18 @@ pub enum StripError {
 }
 
 impl StripError {
-    /// Stable number of the reason, as in `swath_msgs/StripStatus`.
+    /// Stable number of the reason: the REASON constants of `swath_msgs/msg/StripStatus`.
     #[must_use]
     pub fn code(&self) -> u16 {
         match self {
-            Self::NotFinite { .. } => 101,
-            Self::Latitude { .. } => 102,
-            Self::Longitude { .. } => 103,
-            Self::Priority { .. } => 104,
-            Self::Speed { .. } => 105,
-            Self::Length { .. } => 106,
-            Self::Antipodal => 107,
-            Self::NoWindow { .. } => 108,
+            Self::NotFinite { .. } => 100,
+            Self::Latitude { .. } => 101,
+            Self::Longitude { .. } => 102,
+            Self::Priority { .. } => 103,
+            Self::Speed { .. } => 104,
+            Self::Length { .. } => 105,
+            Self::Antipodal => 111,
+            Self::NoWindow { .. } => 110,
         }
     }
 }

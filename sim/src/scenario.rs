@@ -88,6 +88,7 @@ impl ScenarioConfig {
             end_longitude_deg,
             acquisition_speed_m_s: uniform(rng, self.speed_m_s),
             priority: uniform(rng, self.priority),
+            bidirectional: false,
         }
     }
 }

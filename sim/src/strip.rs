@@ -29,6 +29,9 @@ pub struct StripRequest {
     pub priority: f64,
     /// Speed v_acq of the target along the ground [m/s].
     pub acquisition_speed_m_s: f64,
+    /// Whether the strip may as well be imaged from its end to its start.
+    #[serde(default)]
+    pub bidirectional: bool,
 }
 
 /// A strip on the great circle from start to end, in the planet-fixed frame E.
@@ -183,6 +186,7 @@ mod tests {
             end_longitude_deg: 21.0,
             priority: 0.5,
             acquisition_speed_m_s: 3000.0,
+            bidirectional: false,
         }
     }
 
@@ -206,13 +210,13 @@ mod tests {
             change(&mut request);
             request.to_strip(&limits, RADIUS).unwrap_err().code()
         };
-        assert_eq!(code(|r| r.priority = f64::NAN), 101);
-        assert_eq!(code(|r| r.start_latitude_deg = 91.0), 102);
-        assert_eq!(code(|r| r.end_longitude_deg = -181.0), 103);
-        assert_eq!(code(|r| r.priority = 1.5), 104);
-        assert_eq!(code(|r| r.acquisition_speed_m_s = 100.0), 105);
-        assert_eq!(code(|r| r.end_latitude_deg = 60.0), 106);
-        assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (-10.0, 200.0)), 107);
-        assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (10.0, 20.0)), 106);
+        assert_eq!(code(|r| r.priority = f64::NAN), 100);
+        assert_eq!(code(|r| r.start_latitude_deg = 91.0), 101);
+        assert_eq!(code(|r| r.end_longitude_deg = -181.0), 102);
+        assert_eq!(code(|r| r.priority = 1.5), 103);
+        assert_eq!(code(|r| r.acquisition_speed_m_s = 100.0), 104);
+        assert_eq!(code(|r| r.end_latitude_deg = 60.0), 105);
+        assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (-10.0, 200.0)), 111);
+        assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (10.0, 20.0)), 105);
     }
 }

@@ -2,6 +2,7 @@
 #![expect(non_snake_case, reason = "frame letters")]
 #![allow(missing_docs, reason = "a test")]
 
+#[expect(dead_code, reason = "the command-line tool prints more")]
 #[path = "../examples/compare_basilisk/history.rs"]
 mod history;
 
