@@ -1,1 +1,16 @@
-//! .
+//! Bags of ROS 2 messages: records, plays and inspects topic + time + CDR bytes over MCAP.
+//!
+//! A bag is a directory that rosbag2 understands: MCAP files of profile `ros2` and a
+//! `metadata.yaml`. This crate knows message types only by their schema texts.
+
+mod error;
+mod file;
+pub mod metadata;
+pub mod qos;
+mod topic;
+mod writer;
+
+pub use error::{BagError, Result, chain};
+pub use file::chunk::Compression;
+pub use topic::Topic;
+pub use writer::{BagOptions, BagSummary, BagWriter, TopicId};

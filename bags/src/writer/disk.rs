@@ -1,0 +1,397 @@
+//! The writer's thread: files of a bag, their splitting, their end, and a full disk.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+    sync::{Arc, PoisonError},
+    time::Duration,
+};
+
+use mcap::records::Metadata;
+
+use super::{BagOptions, BagSummary, Job, Shared, State};
+use crate::{
+    error::{BagError, Result},
+    file::{
+        chunk::{Chunk, Compressor},
+        writer::{Disk, FileSummary, FileWriter, TopicIds},
+    },
+    metadata::{
+        self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata,
+    },
+    topic::Topic,
+};
+
+/// The metadata record that tells how the recording went.
+pub(crate) const RECORDING: &str = "swath_recording";
+
+/// Opens the file that a path names; tests put limits on it.
+pub(super) type OpenDisk = fn(&Path) -> io::Result<Box<dyn Disk>>;
+
+fn open_file(path: &Path) -> io::Result<Box<dyn Disk>> {
+    Ok(Box::new(File::create_new(path)?))
+}
+
+/// A finished file of the bag.
+struct Finished {
+    name: String,
+    summary: FileSummary,
+}
+
+/// Everything that the thread owns.
+pub(super) struct Storage {
+    dir: PathBuf,
+    name: String,
+    options: BagOptions,
+    compressor: Compressor,
+    open: OpenDisk,
+    topics: Vec<(Arc<Topic>, TopicIds)>,
+    metadata: Vec<Metadata>,
+    file: FileWriter,
+    finished: Vec<Finished>,
+    /// Whether `file` still lacks its end.
+    unfinished: bool,
+    split: bool,
+    lost_by_topic: BTreeMap<String, u64>,
+    lost_to_disk: u64,
+}
+
+impl Storage {
+    /// Starts the first file of the bag in the existing directory `dir`.
+    pub(super) fn create(dir: &Path, compressor: Compressor, options: BagOptions) -> Result<Self> {
+        Self::create_on(dir, compressor, options, open_file)
+    }
+
+    /// [`create`](Self::create) on another kind of disk.
+    pub(super) fn create_on(
+        dir: &Path,
+        compressor: Compressor,
+        options: BagOptions,
+        open: OpenDisk,
+    ) -> Result<Self> {
+        let name = dir
+            .file_name()
+            .map_or("bag".into(), |n| n.to_string_lossy().into_owned());
+        let path = dir.join(format!("{name}_0.mcap"));
+        let file = open(&path)
+            .and_then(FileWriter::create)
+            .map_err(BagError::io("create", &path))?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            name,
+            options,
+            compressor,
+            open,
+            topics: Vec::new(),
+            metadata: Vec::new(),
+            file,
+            finished: Vec::new(),
+            unfinished: true,
+            split: false,
+            lost_by_topic: BTreeMap::new(),
+            lost_to_disk: 0,
+        })
+    }
+
+    /// Takes jobs until the writer closes or storing fails.
+    pub(super) fn run(mut self, shared: &Shared) -> Result<BagSummary> {
+        while let Some(job) = next_job(shared) {
+            if let Err(error) = self.store(job, shared) {
+                return self.stop(error, shared);
+            }
+        }
+        self.lost_by_topic = lost_by_topic(shared);
+        match self.finish_bag() {
+            Ok(()) => Ok(self.bag_summary()),
+            Err(error) => self.stop(error, shared),
+        }
+    }
+
+    fn store(&mut self, job: Job, shared: &Shared) -> io::Result<()> {
+        match job {
+            Job::Topic(topic, ids) => {
+                self.topics.push((Arc::clone(&topic), ids));
+                self.file.add_topic(&topic, ids)
+            }
+            Job::Metadata(record) => {
+                self.metadata.push(record.clone());
+                self.file.add_metadata(&record)
+            }
+            Job::Split => {
+                self.split = self.file.messages() > 0;
+                Ok(())
+            }
+            Job::Chunk(chunk) => {
+                let stored = self.store_chunk(&chunk);
+                if stored.is_err() {
+                    self.lost_to_disk += chunk.messages;
+                }
+                recycle(chunk, shared);
+                stored
+            }
+        }
+    }
+
+    fn store_chunk(&mut self, chunk: &Chunk) -> io::Result<()> {
+        if std::mem::take(&mut self.split) {
+            self.next_file()?;
+        }
+        self.file.add_chunk(chunk, &mut self.compressor)?;
+        self.split = self
+            .options
+            .max_file_bytes
+            .is_some_and(|max| self.file.len() >= max);
+        Ok(())
+    }
+
+    /// Closes the current file and starts the next with all that is known so far.
+    fn next_file(&mut self) -> io::Result<()> {
+        self.finish_file()?;
+        self.write_yaml()?;
+        let path = self.dir.join(self.file_name());
+        let opened = (self.open)(&path)
+            .and_then(FileWriter::create)
+            .and_then(|mut file| {
+                self.topics
+                    .iter()
+                    .try_for_each(|(topic, ids)| file.add_topic(topic, *ids))?;
+                self.metadata
+                    .iter()
+                    .try_for_each(|record| file.add_metadata(record))?;
+                Ok(file)
+            });
+        match opened {
+            Ok(file) => {
+                self.file = file;
+                self.unfinished = true;
+                Ok(())
+            }
+            Err(error) => {
+                // The bag ends with the previous file; half a next one would spoil it.
+                let _ = fs::remove_file(&path);
+                Err(error)
+            }
+        }
+    }
+
+    /// The name of the file that is being written.
+    fn file_name(&self) -> String {
+        format!("{}_{}.mcap", self.name, self.finished.len())
+    }
+
+    fn finish_file(&mut self) -> io::Result<()> {
+        let name = self.file_name();
+        let summary = self.file.finish()?;
+        self.unfinished = false;
+        self.finished.push(Finished { name, summary });
+        Ok(())
+    }
+
+    fn finish_bag(&mut self) -> io::Result<()> {
+        self.file.add_metadata(&self.recording())?;
+        self.finish_file()?;
+        self.write_yaml()
+    }
+
+    /// After a failure: closes the bag as far as it goes and refuses further messages.
+    fn stop(mut self, error: io::Error, shared: &Shared) -> Result<BagSummary> {
+        let path = self.dir.join(self.file_name());
+        self.lost_to_disk += drain(shared);
+        self.lost_by_topic = lost_by_topic(shared);
+        let ended = if self.unfinished {
+            self.finish_in_less_room()
+        } else {
+            self.write_yaml()
+        };
+        if ended.is_ok() && BagError::is_disk_full(&error) {
+            let kept = self.bag_summary().messages;
+            return Err(BagError::DiskFull {
+                path,
+                kept,
+                lost: self.lost_to_disk,
+            });
+        }
+        Err(BagError::io("write", &path)(error))
+    }
+
+    /// Takes chunks off the end until index, footer and `metadata.yaml` fit.
+    fn finish_in_less_room(&mut self) -> io::Result<()> {
+        loop {
+            let finished = self.finished.len();
+            let Err(error) = self.finish_bag() else {
+                return Ok(());
+            };
+            self.finished.truncate(finished);
+            match self.file.drop_last_chunk()? {
+                Some(messages) => self.lost_to_disk += messages,
+                None => return Err(error),
+            }
+        }
+    }
+
+    fn lost(&self) -> u64 {
+        self.lost_to_disk + self.lost_by_topic.values().sum::<u64>()
+    }
+
+    /// How the recording went, for the bag itself.
+    fn recording(&self) -> Metadata {
+        let mut metadata = BTreeMap::new();
+        metadata.insert("lost_messages".to_owned(), self.lost().to_string());
+        metadata.insert(
+            "lost_messages full disk".to_owned(),
+            self.lost_to_disk.to_string(),
+        );
+        for (topic, n) in &self.lost_by_topic {
+            metadata.insert(format!("lost_messages {topic}"), n.to_string());
+        }
+        Metadata {
+            name: RECORDING.to_owned(),
+            metadata,
+        }
+    }
+
+    fn bag_summary(&self) -> BagSummary {
+        let with_messages = || {
+            self.finished
+                .iter()
+                .map(|f| &f.summary)
+                .filter(|s| s.messages > 0)
+        };
+        let mut summary = BagSummary {
+            messages: with_messages().map(|s| s.messages).sum(),
+            lost: self.lost(),
+            counts: BTreeMap::new(),
+            files: self.finished.len(),
+            bytes: self.finished.iter().map(|f| f.summary.bytes).sum(),
+            start: with_messages().map(|s| s.start).min().unwrap_or(0),
+            end: with_messages().map(|s| s.end).max().unwrap_or(0),
+        };
+        for (topic, ids) in &self.topics {
+            let count = |f: &Finished| f.summary.counts.get(&ids.channel).copied().unwrap_or(0);
+            summary
+                .counts
+                .insert(topic.name.clone(), self.finished.iter().map(count).sum());
+        }
+        summary
+    }
+
+    fn write_yaml(&self) -> io::Result<()> {
+        match self.information().write(&self.dir) {
+            Ok(()) => Ok(()),
+            Err(BagError::Io { source, .. }) => Err(source),
+            Err(error) => Err(io::Error::other(error)),
+        }
+    }
+
+    fn information(&self) -> BagInformation {
+        let summary = self.bag_summary();
+        let topics = self.topics.iter().map(|(topic, _)| TopicCount {
+            topic_metadata: TopicMetadata {
+                name: topic.name.clone(),
+                type_name: topic.type_name.clone(),
+                serialization_format: "cdr".to_owned(),
+                offered_qos_profiles: topic.qos.clone(),
+                type_description_hash: topic.type_hash.clone(),
+            },
+            message_count: summary.counts.get(&topic.name).copied().unwrap_or(0),
+        });
+        let mut custom_data = self.options.custom_data.clone();
+        custom_data.insert("lost_messages".to_owned(), summary.lost.to_string());
+        BagInformation {
+            version: metadata::VERSION,
+            storage_identifier: "mcap".to_owned(),
+            duration: Nanoseconds {
+                nanoseconds: summary.end - summary.start,
+            },
+            starting_time: SinceEpoch {
+                nanoseconds_since_epoch: summary.start,
+            },
+            message_count: summary.messages,
+            topics_with_message_count: topics.collect(),
+            compression_format: String::new(),
+            compression_mode: String::new(),
+            relative_file_paths: self.finished.iter().map(|f| f.name.clone()).collect(),
+            files: self.finished.iter().map(file_information).collect(),
+            custom_data: Some(custom_data),
+            ros_distro: self.options.ros_distro.clone(),
+        }
+    }
+}
+
+fn file_information(file: &Finished) -> FileInformation {
+    FileInformation {
+        path: file.name.clone(),
+        starting_time: SinceEpoch {
+            nanoseconds_since_epoch: file.summary.start,
+        },
+        duration: Nanoseconds {
+            nanoseconds: file.summary.end - file.summary.start,
+        },
+        message_count: file.summary.messages,
+    }
+}
+
+/// The next job, or a chunk that has become old; `None` when the writer has closed.
+fn next_job(shared: &Shared) -> Option<Job> {
+    let interval = shared.options.flush_interval;
+    let mut state = shared.lock();
+    loop {
+        if let Some(job) = state.queue.pop_front() {
+            if matches!(job, Job::Chunk(_)) {
+                state.queued_chunks -= 1;
+                shared.room.notify_all();
+            }
+            return Some(job);
+        }
+        if state.closing {
+            return None;
+        }
+        if is_old(&state, interval) && shared.options.snapshot_bytes.is_none() {
+            state.seal(None);
+            continue;
+        }
+        // Half the interval keeps a chunk's age on disk below one and a half intervals.
+        let waited = shared.work.wait_timeout(state, interval / 2);
+        state = waited.unwrap_or_else(PoisonError::into_inner).0;
+    }
+}
+
+fn is_old(state: &State, interval: Duration) -> bool {
+    state
+        .front
+        .opened
+        .is_some_and(|opened| opened.elapsed() >= interval)
+}
+
+/// Gives a stored chunk's memory back.
+fn recycle(mut chunk: Chunk, shared: &Shared) {
+    chunk.clear();
+    let mut state = shared.lock();
+    if state.spare.len() < super::QUEUE_CHUNKS {
+        state.spare.push(chunk);
+    }
+}
+
+/// What [`super::BagWriter::count_lost`] was told.
+fn lost_by_topic(shared: &Shared) -> BTreeMap<String, u64> {
+    let state = shared.lock();
+    let lossy = state.topics.iter().filter(|t| t.lost > 0);
+    lossy.map(|t| (t.topic.name.clone(), t.lost)).collect()
+}
+
+/// Refuses further messages; returns how many were waiting to be stored.
+fn drain(shared: &Shared) -> u64 {
+    let mut state = shared.lock();
+    state.stopped = true;
+    let queued = state.queue.drain(..).map(|job| match job {
+        Job::Chunk(chunk) => chunk.messages,
+        Job::Topic(..) | Job::Metadata(_) | Job::Split => 0,
+    });
+    let lost = queued.sum::<u64>() + state.front.messages;
+    state.front.clear();
+    state.queued_chunks = 0;
+    shared.room.notify_all();
+    lost
+}

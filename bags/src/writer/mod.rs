@@ -1,0 +1,406 @@
+//! Writes bags: messages are gathered in memory here, and compressed and stored by a thread.
+
+mod disk;
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    fs,
+    path::{Path, PathBuf},
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    thread::JoinHandle,
+    time::Duration,
+};
+
+use mcap::records::{MessageHeader, Metadata};
+
+use crate::{
+    error::{BagError, Result},
+    file::{
+        chunk::{Chunk, Compression, Compressor},
+        writer::TopicIds,
+    },
+    topic::Topic,
+};
+
+/// Finished chunks that may wait for the disk before `write` blocks.
+const QUEUE_CHUNKS: usize = 32;
+
+/// How a bag is written.
+#[derive(Debug, Clone)]
+pub struct BagOptions {
+    /// Compression of chunks.
+    pub compression: Compression,
+    /// Level of zstd, 1 (fast) to 19 (small).
+    pub zstd_level: i32,
+    /// A chunk is closed when its messages reach this size [bytes].
+    pub chunk_bytes: usize,
+    /// A chunk is closed at this age, so that a kill loses no more [wall time].
+    pub flush_interval: Duration,
+    /// A new file is started when one reaches this size [bytes].
+    pub max_file_bytes: Option<u64>,
+    /// A new file is started when one spans this log time.
+    pub max_file_duration: Option<Duration>,
+    /// Snapshot mode: keep this many bytes in memory and store them on [`BagWriter::snapshot`].
+    pub snapshot_bytes: Option<usize>,
+    /// Pairs for `custom_data` in `metadata.yaml`.
+    pub custom_data: BTreeMap<String, String>,
+    /// ROS distribution named in `metadata.yaml`.
+    pub ros_distro: String,
+}
+
+impl Default for BagOptions {
+    fn default() -> Self {
+        Self {
+            compression: Compression::Zstd,
+            zstd_level: 1,
+            chunk_bytes: 1 << 20,
+            flush_interval: Duration::from_millis(500),
+            max_file_bytes: None,
+            max_file_duration: None,
+            snapshot_bytes: None,
+            custom_data: BTreeMap::new(),
+            ros_distro: "jazzy".to_owned(),
+        }
+    }
+}
+
+/// A topic of one [`BagWriter`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TopicId(u16);
+
+/// What a closed bag holds.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct BagSummary {
+    /// Messages in all files.
+    pub messages: u64,
+    /// Messages reported lost with [`BagWriter::count_lost`].
+    pub lost: u64,
+    /// Messages by topic name.
+    pub counts: BTreeMap<String, u64>,
+    /// Number of files.
+    pub files: usize,
+    /// Size of all files [bytes].
+    pub bytes: u64,
+    /// Earliest log time [ns].
+    pub start: u64,
+    /// Latest log time [ns].
+    pub end: u64,
+}
+
+/// What the disk thread has to do, in order.
+enum Job {
+    Topic(Arc<Topic>, TopicIds),
+    Metadata(Metadata),
+    Chunk(Chunk),
+    Split,
+}
+
+struct TopicState {
+    topic: Arc<Topic>,
+    sequence: u32,
+    lost: u64,
+}
+
+#[derive(Default)]
+struct State {
+    topics: Vec<TopicState>,
+    schemas: BTreeMap<(String, String), u16>,
+    front: Chunk,
+    spare: Vec<Chunk>,
+    queue: VecDeque<Job>,
+    queued_chunks: usize,
+    ring: VecDeque<Chunk>,
+    ring_bytes: usize,
+    file_start: Option<u64>,
+    closing: bool,
+    stopped: bool,
+}
+
+impl State {
+    /// Moves the gathered messages on: to the disk, or into the ring in snapshot mode.
+    fn seal(&mut self, snapshot_bytes: Option<usize>) {
+        if self.front.is_empty() {
+            return;
+        }
+        let next = self.spare.pop().unwrap_or_default();
+        let full = std::mem::replace(&mut self.front, next);
+        let Some(limit) = snapshot_bytes else {
+            self.queue.push_back(Job::Chunk(full));
+            self.queued_chunks += 1;
+            return;
+        };
+        self.ring_bytes += full.data.len();
+        self.ring.push_back(full);
+        while self.ring_bytes > limit {
+            let Some(mut oldest) = self.ring.pop_front() else {
+                break;
+            };
+            self.ring_bytes -= oldest.data.len();
+            oldest.clear();
+            self.spare.push(oldest);
+        }
+    }
+}
+
+struct Shared {
+    options: BagOptions,
+    state: Mutex<State>,
+    /// Signals the disk thread: there is a job, or the end has come.
+    work: Condvar,
+    /// Signals blocked writers: the queue has room again.
+    room: Condvar,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // No code panics while it holds the lock halfway through a change.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A bag being written: `<dir>/<dir's name>_0.mcap` and on, and `<dir>/metadata.yaml`.
+///
+/// All methods take `&self`, so several threads may write. A message is copied and indexed in the
+/// calling thread; a thread of the writer's own compresses and stores whole chunks. When the disk
+/// cannot keep up, [`write`](Self::write) waits: nothing is dropped.
+pub struct BagWriter {
+    dir: PathBuf,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<Result<BagSummary>>>,
+}
+
+impl BagWriter {
+    /// Makes the directory `dir` and starts the bag's first file.
+    ///
+    /// # Errors
+    /// [`BagError::Exists`] when `dir` is there already, [`BagError::Io`] when it cannot be made.
+    pub fn create(dir: &Path, options: BagOptions) -> Result<Self> {
+        if let Some(parent) = dir.parent() {
+            fs::create_dir_all(parent).map_err(BagError::io("create", parent))?;
+        }
+        fs::create_dir(dir).map_err(|e| match e.kind() {
+            std::io::ErrorKind::AlreadyExists => BagError::Exists {
+                path: dir.to_owned(),
+            },
+            _ => BagError::io("create", dir)(e),
+        })?;
+        let compressor = Compressor::new(options.compression, options.zstd_level).map_err(|e| {
+            BagError::Option {
+                option: "--compression",
+                reason: e.to_string(),
+            }
+        })?;
+        let shared = Arc::new(Shared {
+            options,
+            state: Mutex::new(State::default()),
+            work: Condvar::new(),
+            room: Condvar::new(),
+        });
+        let storage = disk::Storage::create(dir, compressor, shared.options.clone())?;
+        let for_thread = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("bag-disk".to_owned())
+            .spawn(move || storage.run(&for_thread))
+            .map_err(BagError::io("start the thread of", dir))?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// The bag directory.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Adds a topic; the same name and type again give the same id.
+    ///
+    /// # Errors
+    /// [`BagError::Topic`] when the name is there with another type, or at 65 535 topics.
+    pub fn add_topic(&self, topic: &Topic) -> Result<TopicId> {
+        let refuse = |reason: String| BagError::Topic {
+            topic: topic.name.clone(),
+            reason,
+        };
+        let mut state = self.shared.lock();
+        if let Some(at) = state.topics.iter().position(|t| t.topic.name == topic.name) {
+            let known = &state.topics[at].topic.type_name;
+            if *known != topic.type_name {
+                return Err(refuse(format!(
+                    "is {known} in this bag, not {}",
+                    topic.type_name
+                )));
+            }
+            return Ok(TopicId(at as u16));
+        }
+        let channel = u16::try_from(state.topics.len())
+            .ok()
+            .filter(|id| *id < u16::MAX)
+            .ok_or_else(|| refuse(format!("a bag holds at most {} topics", u16::MAX)))?;
+        let key = (topic.type_name.clone(), topic.schema.clone());
+        let next = state.schemas.len() as u16 + 1;
+        let schema = *state.schemas.entry(key).or_insert(next);
+        let ids = TopicIds {
+            channel,
+            schema,
+            new_schema: schema == next,
+        };
+        let topic = Arc::new(topic.clone());
+        state.queue.push_back(Job::Topic(Arc::clone(&topic), ids));
+        state.topics.push(TopicState {
+            topic,
+            sequence: 0,
+            lost: 0,
+        });
+        drop(state);
+        self.shared.work.notify_one();
+        Ok(TopicId(channel))
+    }
+
+    /// Adds a metadata record, which every file of the bag will hold.
+    pub fn add_metadata(&self, name: &str, metadata: BTreeMap<String, String>) {
+        let record = Metadata {
+            name: name.to_owned(),
+            metadata,
+        };
+        self.shared.lock().queue.push_back(Job::Metadata(record));
+        self.shared.work.notify_one();
+    }
+
+    /// Adds one message: its times [ns] and its CDR bytes, encapsulation header included.
+    ///
+    /// Blocks while the disk is behind.
+    ///
+    /// # Errors
+    /// [`BagError::WriterStopped`] once storing has failed; [`close`](Self::close) tells why.
+    pub fn write(
+        &self,
+        topic: TopicId,
+        log_time: u64,
+        publish_time: u64,
+        cdr: &[u8],
+    ) -> Result<()> {
+        self.write_parts(topic, log_time, publish_time, &[cdr])
+    }
+
+    /// Like [`write`](Self::write) for a message that lies in several pieces.
+    pub fn write_parts(
+        &self,
+        topic: TopicId,
+        log_time: u64,
+        publish_time: u64,
+        parts: &[&[u8]],
+    ) -> Result<()> {
+        let options = &self.shared.options;
+        let mut state = self.shared.lock();
+        if state.stopped {
+            return Err(BagError::WriterStopped);
+        }
+        if self.file_spans_too_long(&mut state, log_time) {
+            state.seal(options.snapshot_bytes);
+            state.queue.push_back(Job::Split);
+        }
+        let header = MessageHeader {
+            channel_id: topic.0,
+            sequence: state.topics[usize::from(topic.0)].sequence,
+            log_time,
+            publish_time,
+        };
+        state.topics[usize::from(topic.0)].sequence = header.sequence.wrapping_add(1);
+        state.front.push(&header, parts);
+        if state.front.data.len() < options.chunk_bytes {
+            return Ok(());
+        }
+        state.seal(options.snapshot_bytes);
+        self.shared.work.notify_one();
+        while state.queued_chunks > QUEUE_CHUNKS && !state.stopped {
+            state = self
+                .shared
+                .room
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+        Ok(())
+    }
+
+    fn file_spans_too_long(&self, state: &mut State, log_time: u64) -> bool {
+        let Some(limit) = self.shared.options.max_file_duration else {
+            return false;
+        };
+        let start = *state.file_start.get_or_insert(log_time);
+        let too_long = u128::from(log_time.saturating_sub(start)) >= limit.as_nanos();
+        if too_long {
+            state.file_start = Some(log_time);
+        }
+        too_long
+    }
+
+    /// Counts messages of a topic that were lost before they reached the writer.
+    pub fn count_lost(&self, topic: TopicId, messages: u64) {
+        self.shared.lock().topics[usize::from(topic.0)].lost += messages;
+    }
+
+    /// Starts a new file with the next message.
+    pub fn split(&self) {
+        let mut state = self.shared.lock();
+        state.seal(self.shared.options.snapshot_bytes);
+        state.queue.push_back(Job::Split);
+        state.file_start = None;
+        drop(state);
+        self.shared.work.notify_one();
+    }
+
+    /// Stores what snapshot mode has kept in memory; returns the number of messages.
+    pub fn snapshot(&self) -> u64 {
+        let mut state = self.shared.lock();
+        state.seal(self.shared.options.snapshot_bytes);
+        let ring = std::mem::take(&mut state.ring);
+        state.ring_bytes = 0;
+        state.queued_chunks += ring.len();
+        let messages = ring.iter().map(|chunk| chunk.messages).sum();
+        state.queue.extend(ring.into_iter().map(Job::Chunk));
+        drop(state);
+        self.shared.work.notify_one();
+        messages
+    }
+
+    /// Whether storing has failed, so that further messages are refused.
+    pub fn has_stopped(&self) -> bool {
+        self.shared.lock().stopped
+    }
+
+    /// Stores what is left, closes the last file and writes `metadata.yaml`.
+    ///
+    /// # Errors
+    /// What stopped the writer: [`BagError::DiskFull`] (the bag is readable up to there) or
+    /// [`BagError::Io`].
+    pub fn close(mut self) -> Result<BagSummary> {
+        self.end().unwrap_or(Err(BagError::WriterStopped))
+    }
+
+    fn end(&mut self) -> Option<Result<BagSummary>> {
+        let thread = self.thread.take()?;
+        let mut state = self.shared.lock();
+        if self.shared.options.snapshot_bytes.is_none() {
+            state.seal(None);
+        }
+        state.closing = true;
+        drop(state);
+        self.shared.work.notify_one();
+        // The thread has no code that panics; if it did, there would be no result to report.
+        Some(thread.join().unwrap_or(Err(BagError::WriterStopped)))
+    }
+}
+
+impl Drop for BagWriter {
+    fn drop(&mut self) {
+        if let Some(Err(error)) = self.end() {
+            tracing::error!(
+                "bag {}: {}",
+                self.dir.display(),
+                crate::error::chain(&error)
+            );
+        }
+    }
+}
