@@ -7,10 +7,12 @@ mod error;
 mod file;
 pub mod metadata;
 pub mod qos;
+mod reader;
 mod topic;
 mod writer;
 
 pub use error::{BagError, Result, chain};
 pub use file::chunk::Compression;
+pub use reader::{Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
 pub use topic::Topic;
 pub use writer::{BagOptions, BagSummary, BagWriter, TopicId};

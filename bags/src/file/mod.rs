@@ -3,4 +3,6 @@
 pub(crate) mod chunk;
 pub(crate) mod index;
 pub(crate) mod record;
+pub(crate) mod scan;
+pub(crate) mod unpack;
 pub(crate) mod writer;

@@ -1,0 +1,118 @@
+//! Which topics and which span of time.
+
+use regex::Regex;
+
+use super::BagTopic;
+use crate::error::{BagError, Result};
+
+/// Selects topics by name and by regular expression, as `ros2 bag` does.
+#[derive(Debug, Clone, Default)]
+pub struct TopicPattern {
+    names: Vec<String>,
+    regex: Option<Regex>,
+    exclude: Option<Regex>,
+}
+
+impl TopicPattern {
+    /// Names and an expression add up; without either, all topics are selected. `exclude` takes
+    /// away. Expressions must match the whole name.
+    ///
+    /// # Errors
+    /// [`BagError::Option`] when an expression is malformed.
+    pub fn new(names: &[String], regex: Option<&str>, exclude: Option<&str>) -> Result<Self> {
+        Ok(Self {
+            names: names.to_vec(),
+            regex: regex.map(|r| whole("--regex", r)).transpose()?,
+            exclude: exclude.map(|r| whole("--exclude", r)).transpose()?,
+        })
+    }
+
+    /// Whether a topic is selected.
+    pub fn selects(&self, topic: &str) -> bool {
+        let all = self.names.is_empty() && self.regex.is_none();
+        let named = self.names.iter().any(|name| name == topic);
+        let matched = self
+            .regex
+            .as_ref()
+            .is_some_and(|regex| regex.is_match(topic));
+        let excluded = self
+            .exclude
+            .as_ref()
+            .is_some_and(|regex| regex.is_match(topic));
+        (all || named || matched) && !excluded
+    }
+
+    /// The names given one by one.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+}
+
+fn whole(option: &'static str, pattern: &str) -> Result<Regex> {
+    Regex::new(&format!("^(?:{pattern})$")).map_err(|e| BagError::Option {
+        option,
+        reason: e.to_string(),
+    })
+}
+
+/// Which messages are read.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    /// Which topics.
+    pub topics: TopicPattern,
+    /// Earliest log time, itself included [ns].
+    pub from: u64,
+    /// Latest log time, itself included [ns].
+    pub until: u64,
+}
+
+impl Default for Filter {
+    /// Everything.
+    fn default() -> Self {
+        Self {
+            topics: TopicPattern::default(),
+            from: 0,
+            until: u64::MAX,
+        }
+    }
+}
+
+impl Filter {
+    /// By topic index: whether it is read.
+    pub(super) fn selected(&self, topics: &[BagTopic]) -> Result<Vec<bool>> {
+        for name in self.topics.names() {
+            if !topics.iter().any(|t| t.topic.name == *name) {
+                let reason = format!("the bag has no topic {name}");
+                return Err(BagError::Option {
+                    option: "--topic",
+                    reason,
+                });
+            }
+        }
+        Ok(topics
+            .iter()
+            .map(|t| self.topics.selects(&t.topic.name))
+            .collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_expressions_add_up_and_exclusion_takes_away() {
+        let names = ["/a".to_owned()];
+        let pattern = TopicPattern::new(&names, Some("/x/.*"), Some(".*/secret")).unwrap();
+        assert!(pattern.selects("/a"));
+        assert!(pattern.selects("/x/y"));
+        assert!(!pattern.selects("/b"));
+        assert!(!pattern.selects("/x/secret"));
+        assert!(
+            !pattern.selects("/prefix/x/y"),
+            "expressions match whole names"
+        );
+        assert!(TopicPattern::default().selects("/anything"));
+        assert!(TopicPattern::new(&[], Some("("), None).is_err());
+    }
+}
