@@ -1,9 +1,5 @@
 //! Speed of writing and reading bags.
-#![allow(
-    clippy::unwrap_used,
-    missing_docs,
-    reason = "a bench that cannot go on should panic"
-)]
+#![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot go on should panic")]
 
 use std::{hint::black_box, path::Path};
 
@@ -26,25 +22,11 @@ fn payloads() -> Vec<Vec<u8>> {
 }
 
 fn write(dir: &Path, compression: Compression, payloads: &[Vec<u8>]) {
-    let bag = BagWriter::create(
-        dir,
-        BagOptions {
-            compression,
-            ..BagOptions::default()
-        },
-    )
-    .unwrap();
-    let topic = Topic::new(
-        "/x",
-        "a/msg/B",
-        "uint8[292] x\n",
-        "",
-        vec![QosProfile::reliable(1)],
-    );
+    let bag = BagWriter::create(dir, BagOptions { compression, ..BagOptions::default() }).unwrap();
+    let topic = Topic::new("/x", "a/msg/B", "uint8[292] x\n", "", vec![QosProfile::reliable(1)]);
     let topic = bag.add_topic(&topic.unwrap()).unwrap();
     for n in 0..MESSAGES {
-        bag.write(topic, n, n, &payloads[n as usize % payloads.len()])
-            .unwrap();
+        bag.write(topic, n, n, &payloads[n as usize % payloads.len()]).unwrap();
     }
     bag.close().unwrap();
 }
@@ -52,11 +34,7 @@ fn write(dir: &Path, compression: Compression, payloads: &[Vec<u8>]) {
 fn benches(criterion: &mut Criterion) {
     let payloads = payloads();
     let temp = tempfile::tempdir().unwrap();
-    let kinds = [
-        ("none", Compression::None),
-        ("lz4", Compression::Lz4),
-        ("zstd", Compression::Zstd),
-    ];
+    let kinds = [("none", Compression::None), ("lz4", Compression::Lz4), ("zstd", Compression::Zstd)];
     let mut group = criterion.benchmark_group("bag");
     group.sample_size(10);
     for (name, compression) in kinds {

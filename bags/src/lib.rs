@@ -8,6 +8,7 @@ mod file;
 pub mod metadata;
 pub mod qos;
 mod reader;
+pub mod schema;
 mod topic;
 mod writer;
 
@@ -15,4 +16,4 @@ pub use error::{BagError, Result, chain};
 pub use file::chunk::Compression;
 pub use reader::{Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
 pub use topic::Topic;
-pub use writer::{BagOptions, BagSummary, BagWriter, TopicId};
+pub use writer::{BagOptions, BagSummary, BagWriter, Losses, RECORDING, TopicId};

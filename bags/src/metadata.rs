@@ -107,13 +107,9 @@ impl BagInformation {
     /// # Errors
     /// [`BagError::Metadata`] when the YAML writer fails.
     pub fn to_yaml(&self, path: &Path) -> Result<String> {
-        let document = Document {
-            rosbag2_bagfile_information: self.clone(),
-        };
-        serde_yaml_ng::to_string(&document).map_err(|e| BagError::Metadata {
-            path: path.to_owned(),
-            reason: e.to_string(),
-        })
+        let document = Document { rosbag2_bagfile_information: self.clone() };
+        serde_yaml_ng::to_string(&document)
+            .map_err(|e| BagError::Metadata { path: path.to_owned(), reason: e.to_string() })
     }
 
     /// Reads `<dir>/metadata.yaml`; `None` when there is no such file.
@@ -127,11 +123,8 @@ impl BagInformation {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(BagError::io("read", &path)(e)),
         };
-        let document: Document =
-            serde_yaml_ng::from_str(&text).map_err(|e| BagError::Metadata {
-                path: path.clone(),
-                reason: e.to_string(),
-            })?;
+        let document: Document = serde_yaml_ng::from_str(&text)
+            .map_err(|e| BagError::Metadata { path: path.clone(), reason: e.to_string() })?;
         let information = document.rosbag2_bagfile_information;
         if information.version != VERSION {
             let reason = format!("version {} is not {VERSION}", information.version);

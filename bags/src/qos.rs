@@ -15,10 +15,7 @@ pub struct QosDuration {
 
 impl QosDuration {
     /// "No limit", `RMW_DURATION_INFINITE`.
-    pub const INFINITE: Self = Self {
-        sec: 9_223_372_036,
-        nsec: 854_775_807,
-    };
+    pub const INFINITE: Self = Self { sec: 9_223_372_036, nsec: 854_775_807 };
 }
 
 /// How many samples are kept.
@@ -124,18 +121,12 @@ impl QosProfile {
 
     /// Reliable, transient local ("latched"), keep last `depth`.
     pub const fn latched(depth: u64) -> Self {
-        Self {
-            durability: Durability::TransientLocal,
-            ..Self::reliable(depth)
-        }
+        Self { durability: Durability::TransientLocal, ..Self::reliable(depth) }
     }
 
     /// Best effort, volatile, keep last `depth`.
     pub const fn best_effort(depth: u64) -> Self {
-        Self {
-            reliability: Reliability::BestEffort,
-            ..Self::reliable(depth)
-        }
+        Self { reliability: Reliability::BestEffort, ..Self::reliable(depth) }
     }
 }
 
@@ -144,9 +135,7 @@ pub fn to_yaml(profiles: &[QosProfile]) -> Result<String> {
     if profiles.is_empty() {
         return Ok(String::new());
     }
-    serde_yaml_ng::to_string(profiles).map_err(|e| BagError::Qos {
-        reason: e.to_string(),
-    })
+    serde_yaml_ng::to_string(profiles).map_err(|e| BagError::Qos { reason: e.to_string() })
 }
 
 /// Parses what [`to_yaml`] writes; an empty text is an empty list.
@@ -157,9 +146,7 @@ pub fn from_yaml(text: &str) -> Result<Vec<QosProfile>> {
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
-    serde_yaml_ng::from_str(text).map_err(|e| BagError::Qos {
-        reason: e.to_string(),
-    })
+    serde_yaml_ng::from_str(text).map_err(|e| BagError::Qos { reason: e.to_string() })
 }
 
 #[cfg(test)]

@@ -27,26 +27,13 @@ impl Topic {
     ///
     /// # Errors
     /// [`BagError::Topic`] when the name is no full topic name or the type no `pkg/msg/Type`.
-    pub fn new(
-        name: &str,
-        type_name: &str,
-        schema: &str,
-        type_hash: &str,
-        qos: Vec<QosProfile>,
-    ) -> Result<Self> {
-        let refuse = |reason: String| BagError::Topic {
-            topic: name.to_owned(),
-            reason,
-        };
+    pub fn new(name: &str, type_name: &str, schema: &str, type_hash: &str, qos: Vec<QosProfile>) -> Result<Self> {
+        let refuse = |reason: String| BagError::Topic { topic: name.to_owned(), reason };
         if !name.starts_with('/') || name.len() < 2 {
-            return Err(refuse(
-                "a full topic name starts with / and has more".to_owned(),
-            ));
+            return Err(refuse("a full topic name starts with / and has more".to_owned()));
         }
         if !is_type_name(type_name) {
-            return Err(refuse(format!(
-                "{type_name:?} is no type name of the form pkg/msg/Type"
-            )));
+            return Err(refuse(format!("{type_name:?} is no type name of the form pkg/msg/Type")));
         }
         Ok(Self {
             name: name.to_owned(),
@@ -62,8 +49,7 @@ impl Topic {
 /// Whether a text has the form `pkg/msg/Type` (or `srv`, `action` in the middle).
 pub(crate) fn is_type_name(text: &str) -> bool {
     let word = |s: &str| {
-        s.starts_with(|c: char| c.is_ascii_alphabetic())
-            && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        s.starts_with(|c: char| c.is_ascii_alphabetic()) && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
     };
     let parts: Vec<&str> = text.split('/').collect();
     matches!(parts[..], [package, "msg" | "srv" | "action", name] if word(package) && word(name))

@@ -38,10 +38,9 @@ impl FromStr for Compression {
             "none" => Ok(Self::None),
             "lz4" => Ok(Self::Lz4),
             "zstd" => Ok(Self::Zstd),
-            other => Err(BagError::Option {
-                option: "--compression",
-                reason: format!("{other} is none of zstd, lz4, none"),
-            }),
+            other => {
+                Err(BagError::Option { option: "--compression", reason: format!("{other} is none of zstd, lz4, none") })
+            }
         }
     }
 }
@@ -96,9 +95,7 @@ impl Chunk {
         prefix[15..23].copy_from_slice(&header.log_time.to_le_bytes());
         prefix[23..31].copy_from_slice(&header.publish_time.to_le_bytes());
         self.data.extend_from_slice(&prefix);
-        payload
-            .iter()
-            .for_each(|part| self.data.extend_from_slice(part));
+        payload.iter().for_each(|part| self.data.extend_from_slice(part));
     }
 
     /// Empties the chunk and keeps its memory.
@@ -111,11 +108,7 @@ impl Chunk {
 
     /// Messages of each channel that has any: `(channel, count)`.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (u16, u64)> + '_ {
-        let filled = self
-            .index
-            .iter()
-            .enumerate()
-            .filter(|(_, entries)| !entries.is_empty());
+        let filled = self.index.iter().enumerate().filter(|(_, entries)| !entries.is_empty());
         filled.map(|(channel, entries)| (channel as u16, entries.len() as u64))
     }
 }
@@ -134,11 +127,7 @@ impl Compressor {
             Compression::Zstd => Some(zstd::bulk::Compressor::new(level)?),
             Compression::None | Compression::Lz4 => None,
         };
-        Ok(Self {
-            kind,
-            zstd,
-            buffer: Vec::new(),
-        })
+        Ok(Self { kind, zstd, buffer: Vec::new() })
     }
 
     pub(crate) fn kind(&self) -> Compression {
@@ -150,8 +139,7 @@ impl Compressor {
         self.buffer.clear();
         match (self.kind, &mut self.zstd) {
             (Compression::Zstd, Some(zstd)) => {
-                self.buffer
-                    .reserve(zstd::zstd_safe::compress_bound(data.len()));
+                self.buffer.reserve(zstd::zstd_safe::compress_bound(data.len()));
                 zstd.compress_to_buffer(data, &mut self.buffer)?;
                 Ok(&self.buffer)
             }

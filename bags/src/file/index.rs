@@ -127,33 +127,21 @@ impl FileIndex {
         }
         let mut section = Vec::new();
         // The checksum covers the footer up to the checksum itself.
-        self.source
-            .read_vec(start, end - start + PREFIX_LEN as u64 + 16, &mut section)?;
+        self.source.read_vec(start, end - start + PREFIX_LEN as u64 + 16, &mut section)?;
         let crc = crc32fast::hash(&section);
         if footer.summary_crc != 0 && footer.summary_crc != crc {
-            let reason = format!(
-                "summary checksum is {crc:08x}, not {:08x}",
-                footer.summary_crc
-            );
+            let reason = format!("summary checksum is {crc:08x}, not {:08x}", footer.summary_crc);
             return Err(self.source.corrupt(start, reason));
         }
         let mut statistics = None;
         for item in Records::new(&section[..(end - start) as usize]) {
-            let (at, opcode, body) =
-                item.map_err(|(at, reason)| self.source.corrupt(start + at as u64, reason))?;
+            let (at, opcode, body) = item.map_err(|(at, reason)| self.source.corrupt(start + at as u64, reason))?;
             let offset = start + at as u64;
             match self.parse(offset, opcode, body)? {
                 Record::Statistics(found) => statistics = Some(found),
                 Record::ChunkIndex(chunk) => self.add_chunk_index(offset, &chunk)?,
                 Record::MetadataIndex(metadata) => self.read_metadata(&metadata)?,
-                _ => self.add(
-                    Place {
-                        offset,
-                        opcode,
-                        body_len: body.len() as u64,
-                    },
-                    body,
-                )?,
+                _ => self.add(Place { offset, opcode, body_len: body.len() as u64 }, body)?,
             }
         }
         let Some(statistics) = statistics else {
@@ -180,45 +168,25 @@ impl FileIndex {
 
     fn add_chunk_index(&mut self, offset: u64, chunk: &records::ChunkIndex) -> Result<()> {
         let (start, len) = (chunk.chunk_start_offset, chunk.chunk_length);
-        if start
-            .checked_add(len)
-            .is_none_or(|end| end > self.source.len)
-        {
+        if start.checked_add(len).is_none_or(|end| end > self.source.len) {
             let reason = format!("chunk said to lie at {start}, {len} bytes long: past the end");
             return Err(self.source.corrupt(offset, reason));
         }
         let (from, to) = (chunk.message_start_time, chunk.message_end_time);
-        self.chunks.push(ChunkRef {
-            offset: start,
-            len,
-            start: from,
-            end: to,
-            loose: false,
-        });
-        *self
-            .compressions
-            .entry(chunk.compression.clone())
-            .or_insert(0) += 1;
+        self.chunks.push(ChunkRef { offset: start, len, start: from, end: to, loose: false });
+        *self.compressions.entry(chunk.compression.clone()).or_insert(0) += 1;
         Ok(())
     }
 
     fn read_metadata(&mut self, index: &records::MetadataIndex) -> Result<()> {
         let mut body = Vec::new();
-        self.source
-            .read_vec(index.offset, index.length, &mut body)?;
+        self.source.read_vec(index.offset, index.length, &mut body)?;
         let record = Records::new(&body).next();
         let Some(Ok((0, op::METADATA, body))) = record else {
             let reason = format!("no metadata record {:?} here", index.name);
             return Err(self.source.corrupt(index.offset, reason));
         };
-        self.add(
-            Place {
-                offset: index.offset,
-                opcode: op::METADATA,
-                body_len: 0,
-            },
-            body,
-        )
+        self.add(Place { offset: index.offset, opcode: op::METADATA, body_len: 0 }, body)
     }
 
     /// Takes in a header, schema, channel or metadata record; ignores others.
@@ -229,11 +197,7 @@ impl FileIndex {
             }
             Record::Schema { header, data } => {
                 let data = data.into_owned();
-                let schema = Schema {
-                    name: header.name,
-                    encoding: header.encoding,
-                    data,
-                };
+                let schema = Schema { name: header.name, encoding: header.encoding, data };
                 self.schemas.insert(header.id, schema);
             }
             Record::Channel(channel) => {
@@ -270,23 +234,14 @@ impl FileIndex {
     }
 
     /// Takes in a chunk whose records are in `data`.
-    pub(crate) fn add_chunk(
-        &mut self,
-        place: Place,
-        header: &ChunkHeader,
-        data: &[u8],
-    ) -> Result<()> {
+    pub(crate) fn add_chunk(&mut self, place: Place, header: &ChunkHeader, data: &[u8]) -> Result<()> {
         for item in Records::new(data) {
-            let (at, opcode, body) = item.map_err(|(at, reason)| {
-                self.source
-                    .corrupt(place.offset, format!("chunk, byte {at}: {reason}"))
-            })?;
+            let (at, opcode, body) =
+                item.map_err(|(at, reason)| self.source.corrupt(place.offset, format!("chunk, byte {at}: {reason}")))?;
             match opcode {
                 op::MESSAGE => {
-                    let message = message_header(body).map_err(|reason| {
-                        self.source
-                            .corrupt(place.offset, format!("chunk, byte {at}: {reason}"))
-                    })?;
+                    let message = message_header(body)
+                        .map_err(|reason| self.source.corrupt(place.offset, format!("chunk, byte {at}: {reason}")))?;
                     *self.counts.entry(message.channel_id).or_insert(0) += 1;
                 }
                 _ => self.add(Place { opcode, ..place }, body)?,
@@ -294,17 +249,8 @@ impl FileIndex {
         }
         let len = place.end() - place.offset;
         let (start, end) = (header.message_start_time, header.message_end_time);
-        self.chunks.push(ChunkRef {
-            offset: place.offset,
-            len,
-            start,
-            end,
-            loose: false,
-        });
-        *self
-            .compressions
-            .entry(header.compression.clone())
-            .or_insert(0) += 1;
+        self.chunks.push(ChunkRef { offset: place.offset, len, start, end, loose: false });
+        *self.compressions.entry(header.compression.clone()).or_insert(0) += 1;
         Ok(())
     }
 
@@ -314,22 +260,14 @@ impl FileIndex {
         *self.counts.entry(message.channel_id).or_insert(0) += 1;
         let time = message.log_time;
         match self.chunks.last_mut() {
-            Some(run)
-                if run.loose && run.offset + run.len == place.offset && run.len < LOOSE_BYTES =>
-            {
+            Some(run) if run.loose && run.offset + run.len == place.offset && run.len < LOOSE_BYTES => {
                 run.len = place.end() - run.offset;
                 (run.start, run.end) = (run.start.min(time), run.end.max(time));
             }
             _ => {
                 let len = place.end() - place.offset;
                 let offset = place.offset;
-                self.chunks.push(ChunkRef {
-                    offset,
-                    len,
-                    start: time,
-                    end: time,
-                    loose: true,
-                });
+                self.chunks.push(ChunkRef { offset, len, start: time, end: time, loose: true });
             }
         }
         Ok(())
@@ -351,11 +289,7 @@ pub(crate) fn load(
     let Some(Ok((0, op::CHUNK, body))) = Records::new(packed).next() else {
         return Err(source.corrupt(chunk.offset, "no chunk here, the index says there is one"));
     };
-    let place = Place {
-        offset: chunk.offset,
-        opcode: op::CHUNK,
-        body_len: body.len() as u64,
-    };
+    let place = Place { offset: chunk.offset, opcode: op::CHUNK, body_len: body.len() as u64 };
     unpack(source, place, body, unpacker, data).map(|_| ())
 }
 
@@ -369,10 +303,7 @@ pub(crate) fn unpack(
 ) -> Result<ChunkHeader> {
     let corrupt = |reason: String| source.corrupt(place.offset, reason);
     match record::parse(op::CHUNK, body).map_err(corrupt)? {
-        Record::Chunk {
-            header,
-            data: packed,
-        } => {
+        Record::Chunk { header, data: packed } => {
             unpacker.unpack(&header, &packed, data).map_err(corrupt)?;
             Ok(header)
         }

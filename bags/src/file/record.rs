@@ -68,13 +68,9 @@ pub(crate) fn put_schema(out: &mut Vec<u8>, id: u16, name: &str, encoding: &str,
 /// The reason in words; attachments are not parsed, they come back as unknown records.
 pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
     if opcode == records::op::ATTACHMENT {
-        return Ok(Record::Unknown {
-            opcode,
-            data: Cow::Borrowed(body),
-        });
+        return Ok(Record::Unknown { opcode, data: Cow::Borrowed(body) });
     }
-    mcap::parse_record(opcode, body)
-        .map_err(|e| format!("record with opcode {opcode:#04x}: {}", chain(&e)))
+    mcap::parse_record(opcode, body).map_err(|e| format!("record with opcode {opcode:#04x}: {}", chain(&e)))
 }
 
 /// A record's prefix: opcode and body length.
@@ -106,10 +102,7 @@ impl<'a> Iterator for Records<'a> {
         }
         let Some((prefix, body)) = rest.split_first_chunk::<PREFIX_LEN>() else {
             self.offset = self.data.len();
-            return Some(Err((
-                start,
-                format!("{} bytes left where a record starts", rest.len()),
-            )));
+            return Some(Err((start, format!("{} bytes left where a record starts", rest.len()))));
         };
         let (opcode, len) = parse_prefix(prefix);
         match usize::try_from(len).ok().and_then(|len| body.get(..len)) {

@@ -27,11 +27,7 @@ impl Source {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(BagError::io("open", path))?;
         let len = file.metadata().map_err(BagError::io("read", path))?.len();
-        let source = Self {
-            path: path.to_owned(),
-            len,
-            file,
-        };
+        let source = Self { path: path.to_owned(), len, file };
         let mut magic = [0; mcap::MAGIC.len()];
         if len >= magic.len() as u64 {
             source.read_at(0, &mut magic)?;
@@ -49,15 +45,12 @@ impl Source {
             let reason = format!("{} bytes wanted, the file ends at {}", out.len(), self.len);
             return Err(self.corrupt(offset, reason));
         }
-        self.file
-            .read_exact_at(out, offset)
-            .map_err(BagError::io("read", &self.path))
+        self.file.read_exact_at(out, offset).map_err(BagError::io("read", &self.path))
     }
 
     /// Replaces `out` by `len` bytes from an offset.
     pub(crate) fn read_vec(&self, offset: u64, len: u64, out: &mut Vec<u8>) -> Result<()> {
-        if offset.checked_add(len).is_none_or(|end| end > self.len) || len > MAX_CHUNK_BYTES + 1024
-        {
+        if offset.checked_add(len).is_none_or(|end| end > self.len) || len > MAX_CHUNK_BYTES + 1024 {
             let reason = format!("{len} bytes wanted, the file ends at {}", self.len);
             return Err(self.corrupt(offset, reason));
         }
@@ -67,11 +60,7 @@ impl Source {
 
     /// An error at an offset of this file.
     pub(crate) fn corrupt(&self, offset: u64, reason: impl Into<String>) -> BagError {
-        BagError::Corrupt {
-            path: self.path.clone(),
-            offset,
-            reason: reason.into(),
-        }
+        BagError::Corrupt { path: self.path.clone(), offset, reason: reason.into() }
     }
 }
 
@@ -108,11 +97,7 @@ pub(crate) struct Places<'a> {
 impl<'a> Places<'a> {
     /// Starts behind the magic.
     pub(crate) fn new(source: &'a Source) -> Self {
-        Self {
-            source,
-            offset: mcap::MAGIC.len() as u64,
-            ended: false,
-        }
+        Self { source, offset: mcap::MAGIC.len() as u64, ended: false }
     }
 
     fn place(&self) -> Result<Place> {
@@ -125,20 +110,14 @@ impl<'a> Places<'a> {
         self.source.read_at(self.offset, &mut prefix)?;
         let (opcode, body_len) = record::parse_prefix(&prefix);
         if opcode == 0 {
-            return Err(self
-                .source
-                .corrupt(self.offset, "no record: its opcode is 0"));
+            return Err(self.source.corrupt(self.offset, "no record: its opcode is 0"));
         }
         if body_len > left - PREFIX_LEN as u64 {
             let have = left - PREFIX_LEN as u64;
             let reason = format!("record of {body_len} bytes, the file ends after {have}");
             return Err(self.source.corrupt(self.offset, reason));
         }
-        Ok(Place {
-            offset: self.offset,
-            opcode,
-            body_len,
-        })
+        Ok(Place { offset: self.offset, opcode, body_len })
     }
 }
 

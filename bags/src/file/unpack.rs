@@ -20,17 +20,10 @@ impl Unpacker {
     ///
     /// # Errors
     /// The reason in words: size, compression, damaged data or checksum.
-    pub(crate) fn unpack(
-        &mut self,
-        header: &ChunkHeader,
-        packed: &[u8],
-        out: &mut Vec<u8>,
-    ) -> Result<(), String> {
+    pub(crate) fn unpack(&mut self, header: &ChunkHeader, packed: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
         let size = header.uncompressed_size;
         if size > MAX_CHUNK_BYTES {
-            return Err(format!(
-                "chunk of {size} bytes is larger than {MAX_CHUNK_BYTES}"
-            ));
+            return Err(format!("chunk of {size} bytes is larger than {MAX_CHUNK_BYTES}"));
         }
         out.clear();
         match header.compression.as_str() {
@@ -41,24 +34,17 @@ impl Unpacker {
             }
             "zstd" => {
                 out.reserve_exact(size as usize);
-                self.zstd()?
-                    .decompress_to_buffer(packed, out)
-                    .map_err(|e| format!("zstd: {e}"))?;
+                self.zstd()?.decompress_to_buffer(packed, out).map_err(|e| format!("zstd: {e}"))?;
             }
             other => return Err(format!("unknown compression {other:?}")),
         }
         if out.len() as u64 != size {
-            return Err(format!(
-                "chunk unpacks to {} bytes, its header says {size}",
-                out.len()
-            ));
+            return Err(format!("chunk unpacks to {} bytes, its header says {size}", out.len()));
         }
         let crc = crc32fast::hash(out);
         if header.uncompressed_crc != 0 && header.uncompressed_crc != crc {
             let saved = header.uncompressed_crc;
-            return Err(format!(
-                "chunk checksum is {crc:08x}, its header says {saved:08x}"
-            ));
+            return Err(format!("chunk checksum is {crc:08x}, its header says {saved:08x}"));
         }
         Ok(())
     }
@@ -67,8 +53,6 @@ impl Unpacker {
         if self.zstd.is_none() {
             self.zstd = Some(zstd::bulk::Decompressor::new().map_err(|e| format!("zstd: {e}"))?);
         }
-        self.zstd
-            .as_mut()
-            .ok_or_else(|| "zstd: no context".to_owned())
+        self.zstd.as_mut().ok_or_else(|| "zstd: no context".to_owned())
     }
 }

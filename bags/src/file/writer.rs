@@ -96,11 +96,7 @@ impl FileWriter {
 
     /// Messages in the file so far.
     pub(crate) fn messages(&self) -> u64 {
-        self.chunks
-            .iter()
-            .flat_map(|c| &c.counts)
-            .map(|(_, n)| n)
-            .sum()
+        self.chunks.iter().flat_map(|c| &c.counts).map(|(_, n)| n).sum()
     }
 
     /// Writes a topic's schema (when `new_schema`) and channel, ahead of its messages.
@@ -109,19 +105,9 @@ impl FileWriter {
     pub(crate) fn add_topic(&mut self, topic: &Topic, ids: TopicIds) -> io::Result<()> {
         self.scratch.clear();
         if ids.new_schema {
-            let encoding = if topic.schema.is_empty() {
-                ""
-            } else {
-                "ros2msg"
-            };
+            let encoding = if topic.schema.is_empty() { "" } else { "ros2msg" };
             let data = topic.schema.as_bytes();
-            record::put_schema(
-                &mut self.scratch,
-                ids.schema,
-                &topic.type_name,
-                encoding,
-                data,
-            );
+            record::put_schema(&mut self.scratch, ids.schema, &topic.type_name, encoding, data);
         }
         let metadata = BTreeMap::from([
             ("offered_qos_profiles".to_owned(), topic.qos_yaml.clone()),
@@ -149,20 +135,12 @@ impl FileWriter {
         record::put_struct(&mut self.scratch, op::METADATA, metadata);
         self.append_scratch()?;
         let length = self.len - offset;
-        self.metadata.push(records::MetadataIndex {
-            offset,
-            length,
-            name: metadata.name.clone(),
-        });
+        self.metadata.push(records::MetadataIndex { offset, length, name: metadata.name.clone() });
         Ok(())
     }
 
     /// Writes a chunk and its message indexes in one piece.
-    pub(crate) fn add_chunk(
-        &mut self,
-        chunk: &Chunk,
-        compressor: &mut Compressor,
-    ) -> io::Result<()> {
+    pub(crate) fn add_chunk(&mut self, chunk: &Chunk, compressor: &mut Compressor) -> io::Result<()> {
         let compression = compressor.kind().mcap_name();
         let packed = compressor.compress(&chunk.data)?;
         let out = &mut self.scratch;
@@ -192,11 +170,7 @@ impl FileWriter {
         };
         let crc_before = self.crc.clone();
         self.append_scratch()?;
-        self.chunks.push(Written {
-            index,
-            counts: chunk.counts().collect(),
-            crc_before,
-        });
+        self.chunks.push(Written { index, counts: chunk.counts().collect(), crc_before });
         Ok(())
     }
 
@@ -222,11 +196,7 @@ impl FileWriter {
         let summary = self.summary();
         self.scratch.clear();
         let data_section_crc = self.crc.clone().finalize();
-        record::put_struct(
-            &mut self.scratch,
-            op::DATA_END,
-            &records::DataEnd { data_section_crc },
-        );
+        record::put_struct(&mut self.scratch, op::DATA_END, &records::DataEnd { data_section_crc });
         let data_end_len = self.scratch.len();
         let groups = self.put_summary(&summary);
         let summary_start = self.len + data_end_len as u64;
@@ -236,10 +206,7 @@ impl FileWriter {
         }
         self.put_footer(data_end_len, summary_start, summary_offset_start);
         self.append_scratch()?;
-        Ok(FileSummary {
-            bytes: self.len,
-            ..summary
-        })
+        Ok(FileSummary { bytes: self.len, ..summary })
     }
 
     fn summary(&self) -> FileSummary {
@@ -248,18 +215,8 @@ impl FileWriter {
             *summary.counts.entry(*channel).or_insert(0) += n;
             summary.messages += n;
         }
-        summary.start = self
-            .chunks
-            .iter()
-            .map(|c| c.index.message_start_time)
-            .min()
-            .unwrap_or(0);
-        summary.end = self
-            .chunks
-            .iter()
-            .map(|c| c.index.message_end_time)
-            .max()
-            .unwrap_or(0);
+        summary.start = self.chunks.iter().map(|c| c.index.message_start_time).min().unwrap_or(0);
+        summary.end = self.chunks.iter().map(|c| c.index.message_end_time).max().unwrap_or(0);
         summary
     }
 
@@ -272,11 +229,7 @@ impl FileWriter {
             if to > from {
                 let group_start = self.len + from as u64;
                 let group_length = (to - from) as u64;
-                groups.push(records::SummaryOffset {
-                    group_opcode,
-                    group_start,
-                    group_length,
-                });
+                groups.push(records::SummaryOffset { group_opcode, group_start, group_length });
             }
         };
         // Readers look for schemas and channels as two groups, as summary offsets name them.
@@ -323,11 +276,7 @@ impl FileWriter {
     /// Appends footer and end magic; the CRC covers all from the summary's start to itself.
     fn put_footer(&mut self, data_end_len: usize, summary_start: u64, summary_offset_start: u64) {
         let out = &mut self.scratch;
-        let footer = records::Footer {
-            summary_start,
-            summary_offset_start,
-            summary_crc: 0,
-        };
+        let footer = records::Footer { summary_start, summary_offset_start, summary_crc: 0 };
         record::put_struct(out, op::FOOTER, &footer);
         let crc_at = out.len() - 4;
         let crc = crc32fast::hash(&out[data_end_len..crc_at]);
@@ -362,12 +311,7 @@ pub(crate) struct TopicIds {
 /// Appends one message index for each channel; returns their offsets in the file.
 fn put_message_indexes(out: &mut Vec<u8>, chunk: &Chunk, base: u64) -> BTreeMap<u16, u64> {
     let mut offsets = BTreeMap::new();
-    for (channel, entries) in chunk
-        .index
-        .iter()
-        .enumerate()
-        .filter(|(_, e)| !e.is_empty())
-    {
+    for (channel, entries) in chunk.index.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
         let channel = channel as u16;
         offsets.insert(channel, base + out.len() as u64);
         record::put(out, op::MESSAGE_INDEX, |out| {

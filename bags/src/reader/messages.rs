@@ -91,18 +91,11 @@ impl<'a> Messages<'a> {
         let mut chunks = Vec::new();
         for (number, file) in bag.files.iter().enumerate() {
             let wanted = |c: &&ChunkRef| c.end >= filter.from && c.start <= filter.until;
-            let place = |chunk: &ChunkRef| Place {
-                file: number,
-                chunk: *chunk,
-                rank: 0,
-            };
+            let place = |chunk: &ChunkRef| Place { file: number, chunk: *chunk, rank: 0 };
             chunks.extend(file.chunks.iter().filter(wanted).map(place));
         }
         chunks.sort_by_key(|place: &Place| (place.file, place.chunk.offset));
-        chunks
-            .iter_mut()
-            .enumerate()
-            .for_each(|(rank, place)| place.rank = rank);
+        chunks.iter_mut().enumerate().for_each(|(rank, place)| place.rank = rank);
         chunks.sort_by_key(|place| (place.chunk.start, place.rank));
         Ok(Self {
             bag,
@@ -125,10 +118,7 @@ impl<'a> Messages<'a> {
     /// # Errors
     /// [`crate::BagError::Corrupt`] when a chunk is damaged; the messages after it can still be
     /// read by calling again.
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "it lends, which `Iterator` cannot"
-    )]
+    #[expect(clippy::should_implement_trait, reason = "it lends, which `Iterator` cannot")]
     pub fn next(&mut self) -> Result<Option<Message<'_>>> {
         self.open_due_chunks()?;
         let Some(Reverse((_, rank, slot))) = self.heap.peek().copied() else {
@@ -160,8 +150,8 @@ impl<'a> Messages<'a> {
         let open = &self.open[slot];
         let Place { file, chunk, .. } = self.chunks[open.chunk];
         let body = &open.data[entry.body as usize..][..entry.len as usize];
-        let header = message_header(body)
-            .map_err(|reason| self.bag.files[file].source.corrupt(chunk.offset, reason))?;
+        let header =
+            message_header(body).map_err(|reason| self.bag.files[file].source.corrupt(chunk.offset, reason))?;
         Ok(Message {
             topic: entry.topic as usize,
             sequence: header.sequence,
@@ -174,22 +164,13 @@ impl<'a> Messages<'a> {
     /// Opens every chunk that may hold the next message.
     fn open_due_chunks(&mut self) -> Result<()> {
         while let Some(Place { chunk, rank, .. }) = self.chunks.get(self.upcoming).copied() {
-            if self
-                .heap
-                .peek()
-                .is_some_and(|Reverse((time, ..))| *time < chunk.start)
-            {
+            if self.heap.peek().is_some_and(|Reverse((time, ..))| *time < chunk.start) {
                 break;
             }
             let chunk = self.upcoming;
             self.upcoming += 1;
             let slot = self.free.pop().unwrap_or_else(|| {
-                let empty = Open {
-                    chunk,
-                    next: 0,
-                    entries: Vec::new(),
-                    data: Vec::new(),
-                };
+                let empty = Open { chunk, next: 0, entries: Vec::new(), data: Vec::new() };
                 self.open.push(empty);
                 self.open.len() - 1
             });
@@ -225,32 +206,22 @@ impl<'a> Messages<'a> {
 
     /// Reads a slot's chunk and sorts its messages.
     fn fill(&mut self, slot: usize) -> Result<()> {
-        let Open {
-            chunk,
-            entries,
-            data,
-            ..
-        } = &mut self.open[slot];
+        let Open { chunk, entries, data, .. } = &mut self.open[slot];
         let Place { file, chunk, .. } = self.chunks[*chunk];
         let source = &self.bag.files[file].source;
         entries.clear();
         load(source, &chunk, &mut self.unpacker, &mut self.packed, data)?;
         let channels = &self.bag.channels[file];
-        let in_chunk = |at: usize, reason: String| {
-            source.corrupt(chunk.offset, format!("chunk, byte {at}: {reason}"))
-        };
+        let in_chunk = |at: usize, reason: String| source.corrupt(chunk.offset, format!("chunk, byte {at}: {reason}"));
         for item in Records::new(data) {
             let (at, opcode, body) = item.map_err(|(at, reason)| in_chunk(at, reason))?;
             if opcode != op::MESSAGE {
                 continue;
             }
             let header = message_header(body).map_err(|reason| in_chunk(at, reason))?;
-            let topic = *channels.get(&header.channel_id).ok_or_else(|| {
-                in_chunk(
-                    at,
-                    format!("message of unknown channel {}", header.channel_id),
-                )
-            })?;
+            let topic = *channels
+                .get(&header.channel_id)
+                .ok_or_else(|| in_chunk(at, format!("message of unknown channel {}", header.channel_id)))?;
             let in_time = (self.from..=self.until).contains(&header.log_time);
             if in_time && self.selected[topic] {
                 entries.push(Entry {

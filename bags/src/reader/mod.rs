@@ -75,23 +75,11 @@ impl Bag {
     /// or was not closed.
     pub fn open(path: &Path) -> Result<Self> {
         let paths = mcap_files(path)?;
-        let information = if path.is_dir() {
-            BagInformation::read(path)?
-        } else {
-            None
-        };
-        let mut files = paths
-            .iter()
-            .map(|p| FileIndex::open(p))
-            .collect::<Result<Vec<_>>>()?;
+        let information = if path.is_dir() { BagInformation::read(path)? } else { None };
+        let mut files = paths.iter().map(|p| FileIndex::open(p)).collect::<Result<Vec<_>>>()?;
         files.sort_by_key(|file| (start_of(file), file.source.path.clone()));
-        let mut bag = Self {
-            path: path.to_owned(),
-            files: Vec::new(),
-            topics: Vec::new(),
-            channels: Vec::new(),
-            information,
-        };
+        let mut bag =
+            Self { path: path.to_owned(), files: Vec::new(), topics: Vec::new(), channels: Vec::new(), information };
         for file in files {
             bag.add_file(file)?;
         }
@@ -102,11 +90,7 @@ impl Bag {
     fn add_file(&mut self, file: FileIndex) -> Result<()> {
         let mut by_channel = BTreeMap::new();
         for (id, channel) in &file.channels {
-            let none = Schema {
-                name: String::new(),
-                encoding: String::new(),
-                data: Vec::new(),
-            };
+            let none = Schema { name: String::new(), encoding: String::new(), data: Vec::new() };
             let schema = match channel.schema_id {
                 0 => &none,
                 schema => file.schemas.get(&schema).ok_or_else(|| {
@@ -114,15 +98,8 @@ impl Bag {
                     file.source.corrupt(file.source.len, reason)
                 })?,
             };
-            let qos = channel
-                .metadata
-                .get("offered_qos_profiles")
-                .map_or("", String::as_str);
-            let hash = channel
-                .metadata
-                .get("topic_type_hash")
-                .cloned()
-                .unwrap_or_default();
+            let qos = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
+            let hash = channel.metadata.get("topic_type_hash").cloned().unwrap_or_default();
             let topic = BagTopic {
                 topic: Topic {
                     name: channel.topic.clone(),
@@ -206,10 +183,7 @@ impl Bag {
     /// Earliest and latest log time [ns]; `None` without messages.
     pub fn time_range(&self) -> Option<(u64, u64)> {
         let chunks = || self.files.iter().flat_map(|f| &f.chunks);
-        Some((
-            chunks().map(|c| c.start).min()?,
-            chunks().map(|c| c.end).max()?,
-        ))
+        Some((chunks().map(|c| c.start).min()?, chunks().map(|c| c.end).max()?))
     }
 
     /// Metadata records of all files, each name once, later files first to be heard.
@@ -242,10 +216,7 @@ fn start_of(file: &FileIndex) -> Option<u64> {
 /// # Errors
 /// [`BagError::NotABag`] when there is none.
 pub(crate) fn mcap_files(path: &Path) -> Result<Vec<PathBuf>> {
-    let not_a_bag = |reason: &str| BagError::NotABag {
-        path: path.to_owned(),
-        reason: reason.to_owned(),
-    };
+    let not_a_bag = |reason: &str| BagError::NotABag { path: path.to_owned(), reason: reason.to_owned() };
     let kind = fs::metadata(path).map_err(BagError::io("open", path))?;
     if kind.is_file() {
         return Ok(vec![path.to_owned()]);
@@ -260,11 +231,7 @@ pub(crate) fn mcap_files(path: &Path) -> Result<Vec<PathBuf>> {
     }
     if files.is_empty() {
         let hint = path.join(metadata::FILE_NAME);
-        let storage = if hint.exists() {
-            "its storage is not MCAP"
-        } else {
-            "it holds no .mcap file"
-        };
+        let storage = if hint.exists() { "its storage is not MCAP" } else { "it holds no .mcap file" };
         return Err(not_a_bag(storage));
     }
     files.sort();

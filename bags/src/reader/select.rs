@@ -31,14 +31,8 @@ impl TopicPattern {
     pub fn selects(&self, topic: &str) -> bool {
         let all = self.names.is_empty() && self.regex.is_none();
         let named = self.names.iter().any(|name| name == topic);
-        let matched = self
-            .regex
-            .as_ref()
-            .is_some_and(|regex| regex.is_match(topic));
-        let excluded = self
-            .exclude
-            .as_ref()
-            .is_some_and(|regex| regex.is_match(topic));
+        let matched = self.regex.as_ref().is_some_and(|regex| regex.is_match(topic));
+        let excluded = self.exclude.as_ref().is_some_and(|regex| regex.is_match(topic));
         (all || named || matched) && !excluded
     }
 
@@ -49,10 +43,7 @@ impl TopicPattern {
 }
 
 fn whole(option: &'static str, pattern: &str) -> Result<Regex> {
-    Regex::new(&format!("^(?:{pattern})$")).map_err(|e| BagError::Option {
-        option,
-        reason: e.to_string(),
-    })
+    Regex::new(&format!("^(?:{pattern})$")).map_err(|e| BagError::Option { option, reason: e.to_string() })
 }
 
 /// Which messages are read.
@@ -69,11 +60,7 @@ pub struct Filter {
 impl Default for Filter {
     /// Everything.
     fn default() -> Self {
-        Self {
-            topics: TopicPattern::default(),
-            from: 0,
-            until: u64::MAX,
-        }
+        Self { topics: TopicPattern::default(), from: 0, until: u64::MAX }
     }
 }
 
@@ -83,16 +70,10 @@ impl Filter {
         for name in self.topics.names() {
             if !topics.iter().any(|t| t.topic.name == *name) {
                 let reason = format!("the bag has no topic {name}");
-                return Err(BagError::Option {
-                    option: "--topic",
-                    reason,
-                });
+                return Err(BagError::Option { option: "--topic", reason });
             }
         }
-        Ok(topics
-            .iter()
-            .map(|t| self.topics.selects(&t.topic.name))
-            .collect())
+        Ok(topics.iter().map(|t| self.topics.selects(&t.topic.name)).collect())
     }
 }
 
@@ -108,10 +89,7 @@ mod tests {
         assert!(pattern.selects("/x/y"));
         assert!(!pattern.selects("/b"));
         assert!(!pattern.selects("/x/secret"));
-        assert!(
-            !pattern.selects("/prefix/x/y"),
-            "expressions match whole names"
-        );
+        assert!(!pattern.selects("/prefix/x/y"), "expressions match whole names");
         assert!(TopicPattern::default().selects("/anything"));
         assert!(TopicPattern::new(&[], Some("("), None).is_err());
     }

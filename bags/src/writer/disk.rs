@@ -11,26 +11,22 @@ use std::{
 
 use mcap::records::Metadata;
 
-use super::{BagOptions, BagSummary, Job, Shared, State};
+use super::{BagOptions, BagSummary, Job, Losses, RECORDING, Shared, State};
 use crate::{
     error::{BagError, Result},
     file::{
         chunk::{Chunk, Compressor},
         writer::{Disk, FileSummary, FileWriter, TopicIds},
     },
-    metadata::{
-        self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata,
-    },
+    metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata},
     topic::Topic,
 };
 
-/// The metadata record that tells how the recording went.
-pub(crate) const RECORDING: &str = "swath_recording";
-
 /// Opens the file that a path names; tests put limits on it.
-pub(super) type OpenDisk = fn(&Path) -> io::Result<Box<dyn Disk>>;
+pub(super) type OpenDisk = Box<dyn Fn(&Path) -> io::Result<Box<dyn Disk>> + Send>;
 
-fn open_file(path: &Path) -> io::Result<Box<dyn Disk>> {
+/// Opens a real, new file.
+pub(super) fn open_file(path: &Path) -> io::Result<Box<dyn Disk>> {
     Ok(Box::new(File::create_new(path)?))
 }
 
@@ -54,30 +50,18 @@ pub(super) struct Storage {
     /// Whether `file` still lacks its end.
     unfinished: bool,
     split: bool,
-    lost_by_topic: BTreeMap<String, u64>,
-    lost_to_disk: u64,
+    /// Lost because they could not be stored.
+    unsaved: u64,
+    /// All losses, once the writer has ended.
+    lost: Losses,
 }
 
 impl Storage {
     /// Starts the first file of the bag in the existing directory `dir`.
-    pub(super) fn create(dir: &Path, compressor: Compressor, options: BagOptions) -> Result<Self> {
-        Self::create_on(dir, compressor, options, open_file)
-    }
-
-    /// [`create`](Self::create) on another kind of disk.
-    pub(super) fn create_on(
-        dir: &Path,
-        compressor: Compressor,
-        options: BagOptions,
-        open: OpenDisk,
-    ) -> Result<Self> {
-        let name = dir
-            .file_name()
-            .map_or("bag".into(), |n| n.to_string_lossy().into_owned());
+    pub(super) fn create(dir: &Path, compressor: Compressor, options: BagOptions, open: OpenDisk) -> Result<Self> {
+        let name = dir.file_name().map_or("bag".into(), |n| n.to_string_lossy().into_owned());
         let path = dir.join(format!("{name}_0.mcap"));
-        let file = open(&path)
-            .and_then(FileWriter::create)
-            .map_err(BagError::io("create", &path))?;
+        let file = open(&path).and_then(FileWriter::create).map_err(BagError::io("create", &path))?;
         Ok(Self {
             dir: dir.to_owned(),
             name,
@@ -90,8 +74,8 @@ impl Storage {
             finished: Vec::new(),
             unfinished: true,
             split: false,
-            lost_by_topic: BTreeMap::new(),
-            lost_to_disk: 0,
+            unsaved: 0,
+            lost: Losses::default(),
         })
     }
 
@@ -102,7 +86,7 @@ impl Storage {
                 return self.stop(error, shared);
             }
         }
-        self.lost_by_topic = lost_by_topic(shared);
+        self.lost = lost(shared);
         match self.finish_bag() {
             Ok(()) => Ok(self.bag_summary()),
             Err(error) => self.stop(error, shared),
@@ -126,7 +110,7 @@ impl Storage {
             Job::Chunk(chunk) => {
                 let stored = self.store_chunk(&chunk);
                 if stored.is_err() {
-                    self.lost_to_disk += chunk.messages;
+                    self.unsaved += chunk.messages;
                 }
                 recycle(chunk, shared);
                 stored
@@ -139,10 +123,7 @@ impl Storage {
             self.next_file()?;
         }
         self.file.add_chunk(chunk, &mut self.compressor)?;
-        self.split = self
-            .options
-            .max_file_bytes
-            .is_some_and(|max| self.file.len() >= max);
+        self.split = self.options.max_file_bytes.is_some_and(|max| self.file.len() >= max);
         Ok(())
     }
 
@@ -151,17 +132,11 @@ impl Storage {
         self.finish_file()?;
         self.write_yaml()?;
         let path = self.dir.join(self.file_name());
-        let opened = (self.open)(&path)
-            .and_then(FileWriter::create)
-            .and_then(|mut file| {
-                self.topics
-                    .iter()
-                    .try_for_each(|(topic, ids)| file.add_topic(topic, *ids))?;
-                self.metadata
-                    .iter()
-                    .try_for_each(|record| file.add_metadata(record))?;
-                Ok(file)
-            });
+        let opened = (self.open)(&path).and_then(FileWriter::create).and_then(|mut file| {
+            self.topics.iter().try_for_each(|(topic, ids)| file.add_topic(topic, *ids))?;
+            self.metadata.iter().try_for_each(|record| file.add_metadata(record))?;
+            Ok(file)
+        });
         match opened {
             Ok(file) => {
                 self.file = file;
@@ -198,25 +173,17 @@ impl Storage {
     /// After a failure: closes the bag as far as it goes and refuses further messages.
     fn stop(mut self, error: io::Error, shared: &Shared) -> Result<BagSummary> {
         let path = self.dir.join(self.file_name());
-        self.lost_to_disk += drain(shared);
-        self.lost_by_topic = lost_by_topic(shared);
-        let ended = if self.unfinished {
-            self.finish_in_less_room()
-        } else {
-            self.write_yaml()
-        };
+        self.unsaved += drain(shared);
+        self.lost = lost(shared);
+        let ended = if self.unfinished { self.finish_in_less_room() } else { self.write_yaml() };
         if ended.is_ok() && BagError::is_disk_full(&error) {
             let kept = self.bag_summary().messages;
-            return Err(BagError::DiskFull {
-                path,
-                kept,
-                lost: self.lost_to_disk,
-            });
+            return Err(BagError::DiskFull { path, kept, lost: self.unsaved });
         }
         Err(BagError::io("write", &path)(error))
     }
 
-    /// Takes chunks off the end until index, footer and `metadata.yaml` fit.
+    /// Takes chunks, at last the file, off the end until index, footer and `metadata.yaml` fit.
     fn finish_in_less_room(&mut self) -> io::Result<()> {
         loop {
             let finished = self.finished.len();
@@ -225,43 +192,34 @@ impl Storage {
             };
             self.finished.truncate(finished);
             match self.file.drop_last_chunk()? {
-                Some(messages) => self.lost_to_disk += messages,
-                None => return Err(error),
+                Some(messages) => self.unsaved += messages,
+                None if finished == 0 => return Err(error),
+                None => {
+                    // Not even an empty file fits: the bag ends with the one before.
+                    let path = self.dir.join(self.file_name());
+                    fs::remove_file(path)?;
+                    return self.write_yaml();
+                }
             }
         }
     }
 
-    fn lost(&self) -> u64 {
-        self.lost_to_disk + self.lost_by_topic.values().sum::<u64>()
+    fn losses(&self) -> Losses {
+        let mut losses = self.lost.clone();
+        losses.unsaved += self.unsaved;
+        losses
     }
 
     /// How the recording went, for the bag itself.
     fn recording(&self) -> Metadata {
-        let mut metadata = BTreeMap::new();
-        metadata.insert("lost_messages".to_owned(), self.lost().to_string());
-        metadata.insert(
-            "lost_messages full disk".to_owned(),
-            self.lost_to_disk.to_string(),
-        );
-        for (topic, n) in &self.lost_by_topic {
-            metadata.insert(format!("lost_messages {topic}"), n.to_string());
-        }
-        Metadata {
-            name: RECORDING.to_owned(),
-            metadata,
-        }
+        Metadata { name: RECORDING.to_owned(), metadata: self.losses().to_metadata() }
     }
 
     fn bag_summary(&self) -> BagSummary {
-        let with_messages = || {
-            self.finished
-                .iter()
-                .map(|f| &f.summary)
-                .filter(|s| s.messages > 0)
-        };
+        let with_messages = || self.finished.iter().map(|f| &f.summary).filter(|s| s.messages > 0);
         let mut summary = BagSummary {
             messages: with_messages().map(|s| s.messages).sum(),
-            lost: self.lost(),
+            lost: self.losses().total(),
             counts: BTreeMap::new(),
             files: self.finished.len(),
             bytes: self.finished.iter().map(|f| f.summary.bytes).sum(),
@@ -270,9 +228,7 @@ impl Storage {
         };
         for (topic, ids) in &self.topics {
             let count = |f: &Finished| f.summary.counts.get(&ids.channel).copied().unwrap_or(0);
-            summary
-                .counts
-                .insert(topic.name.clone(), self.finished.iter().map(count).sum());
+            summary.counts.insert(topic.name.clone(), self.finished.iter().map(count).sum());
         }
         summary
     }
@@ -302,12 +258,8 @@ impl Storage {
         BagInformation {
             version: metadata::VERSION,
             storage_identifier: "mcap".to_owned(),
-            duration: Nanoseconds {
-                nanoseconds: summary.end - summary.start,
-            },
-            starting_time: SinceEpoch {
-                nanoseconds_since_epoch: summary.start,
-            },
+            duration: Nanoseconds { nanoseconds: summary.end - summary.start },
+            starting_time: SinceEpoch { nanoseconds_since_epoch: summary.start },
             message_count: summary.messages,
             topics_with_message_count: topics.collect(),
             compression_format: String::new(),
@@ -323,12 +275,8 @@ impl Storage {
 fn file_information(file: &Finished) -> FileInformation {
     FileInformation {
         path: file.name.clone(),
-        starting_time: SinceEpoch {
-            nanoseconds_since_epoch: file.summary.start,
-        },
-        duration: Nanoseconds {
-            nanoseconds: file.summary.end - file.summary.start,
-        },
+        starting_time: SinceEpoch { nanoseconds_since_epoch: file.summary.start },
+        duration: Nanoseconds { nanoseconds: file.summary.end - file.summary.start },
         message_count: file.summary.messages,
     }
 }
@@ -359,10 +307,7 @@ fn next_job(shared: &Shared) -> Option<Job> {
 }
 
 fn is_old(state: &State, interval: Duration) -> bool {
-    state
-        .front
-        .opened
-        .is_some_and(|opened| opened.elapsed() >= interval)
+    state.front.opened.is_some_and(|opened| opened.elapsed() >= interval)
 }
 
 /// Gives a stored chunk's memory back.
@@ -374,11 +319,14 @@ fn recycle(mut chunk: Chunk, shared: &Shared) {
     }
 }
 
-/// What [`super::BagWriter::count_lost`] was told.
-fn lost_by_topic(shared: &Shared) -> BTreeMap<String, u64> {
+/// What the writer was told of losses.
+fn lost(shared: &Shared) -> Losses {
     let state = shared.lock();
-    let lossy = state.topics.iter().filter(|t| t.lost > 0);
-    lossy.map(|t| (t.topic.name.clone(), t.lost)).collect()
+    let mut losses = state.carried.clone();
+    for known in state.topics.iter().filter(|t| t.lost > 0) {
+        *losses.by_topic.entry(known.topic.name.clone()).or_insert(0) += known.lost;
+    }
+    losses
 }
 
 /// Refuses further messages; returns how many were waiting to be stored.
@@ -394,4 +342,114 @@ fn drain(shared: &Shared) -> u64 {
     state.queued_chunks = 0;
     shared.room.notify_all();
     lost
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::*;
+    use crate::{Bag, BagWriter, Compression, Filter, qos::QosProfile};
+
+    /// A disk with room for so many bytes, shared by all its files.
+    struct SmallDisk {
+        file: File,
+        len: u64,
+        room: Arc<AtomicU64>,
+    }
+
+    impl Disk for SmallDisk {
+        fn write_at(&mut self, offset: u64, bytes: &[u8]) -> io::Result<()> {
+            assert_eq!(offset, self.len, "files only grow");
+            let room = self.room.load(Ordering::Relaxed);
+            let fits = (bytes.len() as u64).min(room);
+            self.file.write_at(offset, &bytes[..fits as usize])?;
+            self.len += fits;
+            self.room.fetch_sub(fits, Ordering::Relaxed);
+            match fits == bytes.len() as u64 {
+                true => Ok(()),
+                false => Err(io::ErrorKind::StorageFull.into()),
+            }
+        }
+
+        fn truncate(&mut self, len: u64) -> io::Result<()> {
+            self.room.fetch_add(self.len - len, Ordering::Relaxed);
+            self.len = len;
+            self.file.truncate(len)
+        }
+    }
+
+    fn small_disk(room: u64) -> OpenDisk {
+        let room = Arc::new(AtomicU64::new(room));
+        Box::new(move |path| {
+            let room = Arc::clone(&room);
+            Ok(Box::new(SmallDisk { file: File::create_new(path)?, len: 0, room }))
+        })
+    }
+
+    const MESSAGES: u64 = 400;
+
+    fn record(dir: &Path, disk: OpenDisk) -> Result<BagSummary> {
+        let options = BagOptions {
+            compression: Compression::None,
+            chunk_bytes: 1000,
+            max_file_bytes: Some(15_000),
+            ..BagOptions::default()
+        };
+        let bag = BagWriter::create_on(dir, options, disk)?;
+        let qos = vec![QosProfile::reliable(1)];
+        let topic = bag.add_topic(&Topic::new("/x", "a/msg/B", "uint64 x\n", "", qos)?)?;
+        let payload = [0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8];
+        for n in 0..MESSAGES {
+            if bag.write(topic, n, n, &payload).is_err() {
+                bag.count_lost(topic, 1);
+            }
+        }
+        bag.close()
+    }
+
+    fn readable_messages(dir: &Path) -> u64 {
+        let bag = Bag::open(dir).unwrap();
+        let mut messages = bag.messages(&Filter::default()).unwrap();
+        let mut n = 0;
+        while let Some(message) = messages.next().unwrap() {
+            assert_eq!(message.log_time, n);
+            n += 1;
+        }
+        assert_eq!(bag.information().unwrap().message_count, n);
+        n
+    }
+
+    #[test]
+    fn a_full_disk_leaves_a_readable_bag_wherever_it_strikes() {
+        let temp = tempfile::tempdir().unwrap();
+        let whole = temp.path().join("whole");
+        let size = record(&whole, Box::new(open_file)).unwrap().bytes;
+        assert_eq!(readable_messages(&whole), MESSAGES);
+        // Below this, not even an empty bag fits.
+        for room in (2500..size + 200).step_by(97) {
+            let dir = temp.path().join(room.to_string());
+            match record(&dir, small_disk(room)) {
+                Ok(summary) => assert_eq!((summary.messages, summary.lost), (MESSAGES, 0)),
+                Err(BagError::DiskFull { kept, .. }) => {
+                    assert_eq!(readable_messages(&dir), kept, "room for {room} bytes");
+                    assert!(kept < MESSAGES);
+                }
+                Err(error) => panic!("room for {room} bytes: {error}"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_lost_is_told() {
+        let temp = tempfile::tempdir().unwrap();
+        let dir = temp.path().join("small");
+        let Err(BagError::DiskFull { kept, lost, .. }) = record(&dir, small_disk(8000)) else {
+            panic!("the disk should be full")
+        };
+        let bag = Bag::open(&dir).unwrap();
+        let told = Losses::from_metadata(&bag.metadata()[RECORDING]);
+        assert_eq!(told.unsaved, lost);
+        assert_eq!(kept + told.total(), MESSAGES);
+    }
 }

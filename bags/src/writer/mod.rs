@@ -19,6 +19,7 @@ use crate::{
         chunk::{Chunk, Compression, Compressor},
         writer::TopicIds,
     },
+    reader::Message,
     topic::Topic,
 };
 
@@ -73,7 +74,7 @@ pub struct TopicId(u16);
 pub struct BagSummary {
     /// Messages in all files.
     pub messages: u64,
-    /// Messages reported lost with [`BagWriter::count_lost`].
+    /// Messages that were to be in the bag and are not.
     pub lost: u64,
     /// Messages by topic name.
     pub counts: BTreeMap<String, u64>,
@@ -85,6 +86,57 @@ pub struct BagSummary {
     pub start: u64,
     /// Latest log time [ns].
     pub end: u64,
+}
+
+/// The metadata record that tells how a recording went.
+pub const RECORDING: &str = "swath_recording";
+
+/// Messages that were to be in a bag and are not.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Losses {
+    /// Lost on the way to the writer, by topic.
+    pub by_topic: BTreeMap<String, u64>,
+    /// Lost because they could not be stored.
+    pub unsaved: u64,
+}
+
+impl Losses {
+    const TOTAL: &str = "lost_messages";
+    const UNSAVED: &str = "lost_messages unsaved";
+
+    /// All lost messages.
+    pub fn total(&self) -> u64 {
+        self.by_topic.values().sum::<u64>() + self.unsaved
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.unsaved += other.unsaved;
+        for (topic, n) in &other.by_topic {
+            *self.by_topic.entry(topic.clone()).or_insert(0) += n;
+        }
+    }
+
+    /// As the pairs of a [`RECORDING`] record.
+    fn to_metadata(&self) -> BTreeMap<String, String> {
+        let by_topic = self.by_topic.iter();
+        let by_topic = by_topic.map(|(topic, n)| (format!("{} {topic}", Self::TOTAL), n.to_string()));
+        let total = (Self::TOTAL.to_owned(), self.total().to_string());
+        by_topic.chain([total, (Self::UNSAVED.to_owned(), self.unsaved.to_string())]).collect()
+    }
+
+    /// From the pairs of a [`RECORDING`] record.
+    pub fn from_metadata(metadata: &BTreeMap<String, String>) -> Self {
+        let mut losses = Self::default();
+        for (key, value) in metadata {
+            let n = value.parse().unwrap_or(0);
+            if key == Self::UNSAVED {
+                losses.unsaved = n;
+            } else if let Some(topic) = key.strip_prefix("lost_messages /") {
+                losses.by_topic.insert(format!("/{topic}"), n);
+            }
+        }
+        losses
+    }
 }
 
 /// What the disk thread has to do, in order.
@@ -112,6 +164,7 @@ struct State {
     ring: VecDeque<Chunk>,
     ring_bytes: usize,
     file_start: Option<u64>,
+    carried: Losses,
     closing: bool,
     stopped: bool,
 }
@@ -175,38 +228,33 @@ impl BagWriter {
     /// # Errors
     /// [`BagError::Exists`] when `dir` is there already, [`BagError::Io`] when it cannot be made.
     pub fn create(dir: &Path, options: BagOptions) -> Result<Self> {
+        Self::create_on(dir, options, Box::new(disk::open_file))
+    }
+
+    /// [`create`](Self::create) on another kind of disk.
+    fn create_on(dir: &Path, options: BagOptions, open: disk::OpenDisk) -> Result<Self> {
         if let Some(parent) = dir.parent() {
             fs::create_dir_all(parent).map_err(BagError::io("create", parent))?;
         }
         fs::create_dir(dir).map_err(|e| match e.kind() {
-            std::io::ErrorKind::AlreadyExists => BagError::Exists {
-                path: dir.to_owned(),
-            },
+            std::io::ErrorKind::AlreadyExists => BagError::Exists { path: dir.to_owned() },
             _ => BagError::io("create", dir)(e),
         })?;
-        let compressor = Compressor::new(options.compression, options.zstd_level).map_err(|e| {
-            BagError::Option {
-                option: "--compression",
-                reason: e.to_string(),
-            }
-        })?;
+        let compressor = Compressor::new(options.compression, options.zstd_level)
+            .map_err(|e| BagError::Option { option: "--compression", reason: e.to_string() })?;
         let shared = Arc::new(Shared {
             options,
             state: Mutex::new(State::default()),
             work: Condvar::new(),
             room: Condvar::new(),
         });
-        let storage = disk::Storage::create(dir, compressor, shared.options.clone())?;
+        let storage = disk::Storage::create(dir, compressor, shared.options.clone(), open)?;
         let for_thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("bag-disk".to_owned())
             .spawn(move || storage.run(&for_thread))
             .map_err(BagError::io("start the thread of", dir))?;
-        Ok(Self {
-            dir: dir.to_owned(),
-            shared,
-            thread: Some(thread),
-        })
+        Ok(Self { dir: dir.to_owned(), shared, thread: Some(thread) })
     }
 
     /// The bag directory.
@@ -219,18 +267,12 @@ impl BagWriter {
     /// # Errors
     /// [`BagError::Topic`] when the name is there with another type, or at 65 535 topics.
     pub fn add_topic(&self, topic: &Topic) -> Result<TopicId> {
-        let refuse = |reason: String| BagError::Topic {
-            topic: topic.name.clone(),
-            reason,
-        };
+        let refuse = |reason: String| BagError::Topic { topic: topic.name.clone(), reason };
         let mut state = self.shared.lock();
         if let Some(at) = state.topics.iter().position(|t| t.topic.name == topic.name) {
             let known = &state.topics[at].topic.type_name;
             if *known != topic.type_name {
-                return Err(refuse(format!(
-                    "is {known} in this bag, not {}",
-                    topic.type_name
-                )));
+                return Err(refuse(format!("is {known} in this bag, not {}", topic.type_name)));
             }
             return Ok(TopicId(at as u16));
         }
@@ -241,18 +283,10 @@ impl BagWriter {
         let key = (topic.type_name.clone(), topic.schema.clone());
         let next = state.schemas.len() as u16 + 1;
         let schema = *state.schemas.entry(key).or_insert(next);
-        let ids = TopicIds {
-            channel,
-            schema,
-            new_schema: schema == next,
-        };
+        let ids = TopicIds { channel, schema, new_schema: schema == next };
         let topic = Arc::new(topic.clone());
         state.queue.push_back(Job::Topic(Arc::clone(&topic), ids));
-        state.topics.push(TopicState {
-            topic,
-            sequence: 0,
-            lost: 0,
-        });
+        state.topics.push(TopicState { topic, sequence: 0, lost: 0 });
         drop(state);
         self.shared.work.notify_one();
         Ok(TopicId(channel))
@@ -260,10 +294,7 @@ impl BagWriter {
 
     /// Adds a metadata record, which every file of the bag will hold.
     pub fn add_metadata(&self, name: &str, metadata: BTreeMap<String, String>) {
-        let record = Metadata {
-            name: name.to_owned(),
-            metadata,
-        };
+        let record = Metadata { name: name.to_owned(), metadata };
         self.shared.lock().queue.push_back(Job::Metadata(record));
         self.shared.work.notify_one();
     }
@@ -274,20 +305,31 @@ impl BagWriter {
     ///
     /// # Errors
     /// [`BagError::WriterStopped`] once storing has failed; [`close`](Self::close) tells why.
-    pub fn write(
-        &self,
-        topic: TopicId,
-        log_time: u64,
-        publish_time: u64,
-        cdr: &[u8],
-    ) -> Result<()> {
+    pub fn write(&self, topic: TopicId, log_time: u64, publish_time: u64, cdr: &[u8]) -> Result<()> {
         self.write_parts(topic, log_time, publish_time, &[cdr])
     }
 
     /// Like [`write`](Self::write) for a message that lies in several pieces.
-    pub fn write_parts(
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_parts(&self, topic: TopicId, log_time: u64, publish_time: u64, parts: &[&[u8]]) -> Result<()> {
+        self.push(topic, None, log_time, publish_time, parts)
+    }
+
+    /// Adds a message of another bag with the sequence number that it has there.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn copy(&self, topic: TopicId, message: &Message<'_>) -> Result<()> {
+        let Message { sequence, log_time, publish_time, data, .. } = *message;
+        self.push(topic, Some(sequence), log_time, publish_time, &[data])
+    }
+
+    fn push(
         &self,
         topic: TopicId,
+        sequence: Option<u32>,
         log_time: u64,
         publish_time: u64,
         parts: &[&[u8]],
@@ -301,13 +343,11 @@ impl BagWriter {
             state.seal(options.snapshot_bytes);
             state.queue.push_back(Job::Split);
         }
-        let header = MessageHeader {
-            channel_id: topic.0,
-            sequence: state.topics[usize::from(topic.0)].sequence,
-            log_time,
-            publish_time,
-        };
-        state.topics[usize::from(topic.0)].sequence = header.sequence.wrapping_add(1);
+        let known = &mut state.topics[usize::from(topic.0)];
+        let sequence = sequence.unwrap_or(known.sequence);
+        known.sequence = sequence.wrapping_add(1);
+        let channel_id = topic.0;
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time };
         state.front.push(&header, parts);
         if state.front.data.len() < options.chunk_bytes {
             return Ok(());
@@ -315,11 +355,7 @@ impl BagWriter {
         state.seal(options.snapshot_bytes);
         self.shared.work.notify_one();
         while state.queued_chunks > QUEUE_CHUNKS && !state.stopped {
-            state = self
-                .shared
-                .room
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
+            state = self.shared.room.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         Ok(())
     }
@@ -336,9 +372,18 @@ impl BagWriter {
         too_long
     }
 
-    /// Counts messages of a topic that were lost before they reached the writer.
+    /// Counts messages of a topic that were lost before they reached the writer; their sequence
+    /// numbers stay free.
     pub fn count_lost(&self, topic: TopicId, messages: u64) {
-        self.shared.lock().topics[usize::from(topic.0)].lost += messages;
+        let mut state = self.shared.lock();
+        let known = &mut state.topics[usize::from(topic.0)];
+        known.lost += messages;
+        known.sequence = known.sequence.wrapping_add(messages as u32);
+    }
+
+    /// Counts messages that the recording of a copied bag had lost.
+    pub fn carry_lost(&self, lost: &Losses) {
+        self.shared.lock().carried.add(lost);
     }
 
     /// Starts a new file with the next message.
@@ -396,11 +441,7 @@ impl BagWriter {
 impl Drop for BagWriter {
     fn drop(&mut self) {
         if let Some(Err(error)) = self.end() {
-            tracing::error!(
-                "bag {}: {}",
-                self.dir.display(),
-                crate::error::chain(&error)
-            );
+            tracing::error!("bag {}: {}", self.dir.display(), crate::error::chain(&error));
         }
     }
 }

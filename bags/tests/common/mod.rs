@@ -9,8 +9,8 @@ use std::{
 
 use swath_bags::{BagOptions, BagSummary, BagWriter, Topic, qos::QosProfile};
 use swath_msgs::{
-    RosMessage, builtin_interfaces::Time, diagnostic_msgs::DiagnosticArray, rosgraph_msgs::Clock,
-    std_msgs::Header, swath_msgs::SpacecraftState, swath_msgs::UpcomingStrips,
+    RosMessage, builtin_interfaces::Time, diagnostic_msgs::DiagnosticArray, rosgraph_msgs::Clock, std_msgs::Header,
+    swath_msgs::SpacecraftState, swath_msgs::UpcomingStrips,
 };
 
 /// A message's little-endian CDR with its encapsulation header.
@@ -27,22 +27,13 @@ pub fn topic<M: RosMessage>(name: &str, qos: QosProfile) -> Topic {
 
 /// A stamp of a simulated time [ns].
 pub fn stamp(ns: u64) -> Time {
-    Time {
-        sec: (ns / 1_000_000_000) as i32,
-        nanosec: (ns % 1_000_000_000) as u32,
-    }
+    Time { sec: (ns / 1_000_000_000) as i32, nanosec: (ns % 1_000_000_000) as u32 }
 }
 
 /// A state whose numbers follow from its tick.
 pub fn state(tick: u64) -> SpacecraftState {
-    let mut state = SpacecraftState {
-        tick,
-        ..SpacecraftState::default()
-    };
-    state.header = Header {
-        stamp: stamp(tick * TICK),
-        frame_id: "N".to_owned(),
-    };
+    let mut state = SpacecraftState { tick, ..SpacecraftState::default() };
+    state.header = Header { stamp: stamp(tick * TICK), frame_id: "N".to_owned() };
     state.sigma_bn = [0.1, -0.25, tick as f64 / 1024.0];
     state.r_bn_n.x = 6.9e6 + tick as f64;
     state
@@ -54,32 +45,18 @@ pub const TICK: u64 = 500_000_000;
 /// Writes `ticks` of `/clock`, `/swath/state`, and one latched `/swath/strips/upcoming`.
 pub fn write_sample(dir: &Path, ticks: u64, options: BagOptions) -> BagSummary {
     let bag = BagWriter::create(dir, options).unwrap();
-    let clock = bag
-        .add_topic(&topic::<Clock>("/clock", QosProfile::best_effort(1)))
-        .unwrap();
-    let states = bag.add_topic(&topic::<SpacecraftState>(
-        "/swath/state",
-        QosProfile::reliable(10),
-    ));
+    let clock = bag.add_topic(&topic::<Clock>("/clock", QosProfile::best_effort(1))).unwrap();
+    let states = bag.add_topic(&topic::<SpacecraftState>("/swath/state", QosProfile::reliable(10)));
     let states = states.unwrap();
     let strips = topic::<UpcomingStrips>("/swath/strips/upcoming", QosProfile::latched(1));
     let strips = bag.add_topic(&strips).unwrap();
-    bag.add_topic(&topic::<DiagnosticArray>(
-        "/diagnostics",
-        QosProfile::reliable(10),
-    ))
-    .unwrap();
-    let manifest = [
-        ("seed".to_owned(), "7".to_owned()),
-        ("planner".to_owned(), "fixed".to_owned()),
-    ];
+    bag.add_topic(&topic::<DiagnosticArray>("/diagnostics", QosProfile::reliable(10))).unwrap();
+    let manifest = [("seed".to_owned(), "7".to_owned()), ("planner".to_owned(), "fixed".to_owned())];
     bag.add_metadata("swath_manifest", manifest.into());
-    bag.write(strips, 0, 0, &cdr(&UpcomingStrips::default()))
-        .unwrap();
+    bag.write(strips, 0, 0, &cdr(&UpcomingStrips::default())).unwrap();
     for tick in 0..ticks {
         let time = tick * TICK;
-        bag.write(clock, time, time, &cdr(&Clock { clock: stamp(time) }))
-            .unwrap();
+        bag.write(clock, time, time, &cdr(&Clock { clock: stamp(time) })).unwrap();
         bag.write(states, time, time, &cdr(&state(tick))).unwrap();
     }
     bag.close().unwrap()
@@ -92,26 +69,15 @@ pub fn python() -> PathBuf {
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let python = root.join(".venv/bin/python");
-    assert!(
-        python.exists(),
-        "no Python for the tests: run `cargo xtask test`, which makes .venv, or set SWATH_PYTHON"
-    );
+    assert!(python.exists(), "no Python for the tests: run `cargo xtask test`, which makes .venv, or set SWATH_PYTHON");
     python
 }
 
 /// Runs a script of `tests/python` on a bag; returns what it prints.
 pub fn run_python(script: &str, bag: &Path) -> String {
     let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python");
-    let output = Command::new(python())
-        .arg(scripts.join(script))
-        .arg(bag)
-        .output()
-        .unwrap();
+    let output = Command::new(python()).arg(scripts.join(script)).arg(bag).output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.success(),
-        "{script} refused {}:\n{stderr}",
-        bag.display()
-    );
+    assert!(output.status.success(), "{script} refused {}:\n{stderr}", bag.display());
     String::from_utf8(output.stdout).unwrap()
 }

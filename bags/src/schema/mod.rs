@@ -1,0 +1,128 @@
+//! Message definitions as bags carry them (`ros2msg` texts), and decoding CDR by them.
+
+mod decode;
+mod json;
+mod parse;
+
+pub use decode::{Scalar, Visitor, decode};
+pub use json::to_json;
+
+use crate::error::Result;
+
+/// A type that fits one CDR value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Primitive {
+    /// `bool`
+    Bool,
+    /// `int8`
+    I8,
+    /// `uint8`, `byte`, `char`
+    U8,
+    /// `int16`
+    I16,
+    /// `uint16`
+    U16,
+    /// `int32`
+    I32,
+    /// `uint32`
+    U32,
+    /// `int64`
+    I64,
+    /// `uint64`
+    U64,
+    /// `float32`
+    F32,
+    /// `float64`
+    F64,
+    /// `string`
+    String,
+    /// `wstring`
+    WString,
+}
+
+impl Primitive {
+    /// Size and alignment in CDR [bytes]; of a string, its length's.
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::Bool | Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 | Self::String | Self::WString => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// The type of one element of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Element {
+    /// A primitive, with the bound of a bounded string.
+    Primitive(Primitive, Option<usize>),
+    /// A message, by index in its [`Schema`].
+    Struct(usize),
+}
+
+/// How many elements a field has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Count {
+    /// One, no array.
+    One,
+    /// An array of fixed length.
+    Fixed(usize),
+    /// A sequence, with its bound.
+    Sequence(Option<usize>),
+}
+
+/// A field of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// Its name.
+    pub name: String,
+    /// What its elements are.
+    pub element: Element,
+    /// How many there are.
+    pub count: Count,
+}
+
+/// A message definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Struct {
+    /// `pkg/Type`.
+    pub name: String,
+    /// Fields in order; constants are left out.
+    pub fields: Vec<Field>,
+}
+
+/// A message type with all types that it is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Schema {
+    /// `pkg/msg/Type`.
+    pub type_name: String,
+    /// Definitions; the type itself is the first.
+    pub structs: Vec<Struct>,
+}
+
+impl Schema {
+    /// Parses the text of a `ros2msg` schema.
+    ///
+    /// # Errors
+    /// [`crate::BagError::Schema`] when the text is malformed, lacks a type or contains itself.
+    pub fn parse(type_name: &str, text: &str) -> Result<Self> {
+        parse::parse(type_name, text)
+    }
+
+    /// Whether messages begin with a `builtin_interfaces/Time`, alone or in a `std_msgs/Header`.
+    pub fn begins_with_stamp(&self) -> bool {
+        let mut index = 0;
+        loop {
+            if self.structs[index].name == "builtin_interfaces/Time" {
+                return true;
+            }
+            match self.structs[index].fields.first() {
+                Some(Field { element: Element::Struct(inner), count: Count::One, .. }) => {
+                    index = *inner;
+                }
+                _ => return false,
+            }
+        }
+    }
+}
