@@ -113,9 +113,7 @@ impl Env {
     #[must_use]
     pub fn new(model: Arc<Model>, initial: &InitialState, horizon: Tick) -> Self {
         let mut flight = Flight::new(&model, &model, initial);
-        let margin = flight.spacecraft.orbit.period_s() * WINDOW_MARGIN_ORBITS;
-        let windows_until = horizon.after(model.period.ticks_ceil(margin));
-        let catalogue = Catalogue::new(&model, &flight.spacecraft.orbit, windows_until);
+        let catalogue = Catalogue::new(&model, &flight.spacecraft.orbit, windows_until(&model, horizon));
         let situation = flight.situation();
         Self { model, flight, catalogue, horizon, task: 0, situation, candidates: Vec::new() }
     }
@@ -249,9 +247,13 @@ impl Env {
 /// Tick at which a mission of a number of orbits ends.
 #[must_use]
 pub fn horizon(model: &Model, orbits: f64) -> Tick {
-    let radius = model.config.earth.radius_m + model.config.orbit.altitude_km * 1e3;
-    let period_s = std::f64::consts::TAU * (radius * radius * radius / model.config.earth.mu_m3_s2).sqrt();
-    Tick((orbits * period_s / model.period.seconds()).round() as u64)
+    Tick((orbits * model.orbit_period_s() / model.period.seconds()).round() as u64)
+}
+
+/// Tick up to which a mission that ends at `horizon` seeks windows.
+#[must_use]
+pub fn windows_until(model: &Model, horizon: Tick) -> Tick {
+    horizon.after(model.period.ticks_ceil(model.orbit_period_s() * WINDOW_MARGIN_ORBITS))
 }
 
 /// Totals over the tasks of a mission.

@@ -99,6 +99,12 @@ impl TaskOutcome {
     /// Outcome of a task that never began.
     pub const NOT_BEGUN: Self =
         Self { failure: Some(FailureReason::Interrupted), max_attitude_error: 0.0, min_sin_elevation: 1.0 };
+
+    /// Least elevation while imaging [rad]; π/2 when imaging did not begin.
+    #[must_use]
+    pub fn min_elevation(&self) -> f64 {
+        libm::asin(self.min_sin_elevation)
+    }
 }
 
 /// What guidance knows and commands at one tick.

@@ -39,6 +39,19 @@ impl Model {
         })
     }
 
+    /// Radius of the orbit [m].
+    #[must_use]
+    pub fn orbit_radius(&self) -> f64 {
+        self.config.earth.radius_m + self.config.orbit.altitude_km * 1e3
+    }
+
+    /// Period of the orbit [s].
+    #[must_use]
+    pub fn orbit_period_s(&self) -> f64 {
+        let radius = self.orbit_radius();
+        std::f64::consts::TAU * (radius * radius * radius / self.config.earth.mu_m3_s2).sqrt()
+    }
+
     /// Longest transition in whole ticks.
     #[must_use]
     pub fn t_pre_max(&self) -> u32 {

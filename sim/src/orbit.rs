@@ -112,12 +112,6 @@ impl Orbit {
         let (c, s) = self.argument.cos_sin(tick);
         (self.ahead_N * c - self.node_N * s) * (self.radius * self.mean_motion)
     }
-
-    /// Period of the orbit [s].
-    #[must_use]
-    pub fn period_s(&self) -> f64 {
-        std::f64::consts::TAU / self.mean_motion
-    }
 }
 
 /// Rotates planet-fixed components (E) to inertial components (N) about the common z axis.
@@ -188,7 +182,6 @@ mod tests {
         // Vis viva on a circle: v² = μ/r.
         assert_relative_eq!(v.norm_squared(), 3.986_004_418e14 / r.norm(), max_relative = 1e-12);
         assert_relative_eq!(r.cross(&v).normalize().z, libm::cos(45f64.to_radians()), epsilon = 1e-12);
-        assert_relative_eq!(orbit.period_s(), 5701.8, epsilon = 0.5);
     }
 
     #[test]

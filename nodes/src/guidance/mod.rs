@@ -1,0 +1,3 @@
+//! The guidance node: it flies the active task.
+
+pub mod logic;

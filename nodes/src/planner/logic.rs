@@ -1,0 +1,158 @@
+//! The planner node without ROS: it decides when both the situation and the candidates of a task are known.
+
+use swath_sim::catalogue::Candidate;
+use swath_sim::flight::Situation;
+use swath_sim::guidance::Task;
+use swath_sim::model::Model;
+use swath_sim::planner::{Decision, DecisionContext, Heuristic, Planner, PlannerError};
+
+/// The candidates of a task, with the names of their strips.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Upcoming {
+    /// Number of the task.
+    pub task: u64,
+    /// The candidates.
+    pub candidates: Vec<Candidate>,
+    /// Name of each candidate's strip.
+    pub names: Vec<String>,
+}
+
+/// A decision made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// Number of the task.
+    pub task: u64,
+    /// Situation it rests on.
+    pub situation: Situation,
+    /// What was decided.
+    pub decision: Decision,
+    /// The task that follows from it.
+    pub kind: Task,
+    /// Name of the planner that decided.
+    pub planner: String,
+    /// Why the planner itself did not decide and the heuristic took over.
+    pub fault: Option<String>,
+}
+
+/// The planner node's state.
+pub struct PlannerLogic {
+    model: Model,
+    planner: Box<dyn Planner + Send>,
+    fallback: Heuristic,
+    point: Option<(u64, Situation)>,
+    upcoming: Option<Upcoming>,
+    decided: Option<u64>,
+}
+
+/// Transition of the heuristic that takes over from a planner that fails [s].
+const FALLBACK_T_PRE_S: f64 = 90.0;
+
+impl PlannerLogic {
+    /// A planner node around a planner.
+    #[must_use]
+    pub fn new(model: Model, planner: Box<dyn Planner + Send>) -> Self {
+        Self {
+            model,
+            planner,
+            fallback: Heuristic { t_pre_s: FALLBACK_T_PRE_S },
+            point: None,
+            upcoming: None,
+            decided: None,
+        }
+    }
+
+    /// A task is wanted.
+    pub fn on_decision_point(&mut self, task: u64, situation: Situation) -> Option<Planned> {
+        self.point = Some((task, situation));
+        self.decide()
+    }
+
+    /// The candidates of a task are known.
+    pub fn on_upcoming(&mut self, upcoming: Upcoming) -> Option<Planned> {
+        self.upcoming = Some(upcoming);
+        self.decide()
+    }
+
+    /// The candidates that the last decision rested on.
+    #[must_use]
+    pub fn upcoming(&self) -> Option<&Upcoming> {
+        self.upcoming.as_ref()
+    }
+
+    fn decide(&mut self) -> Option<Planned> {
+        let (task, situation) = self.point?;
+        let upcoming = self.upcoming.as_ref().filter(|upcoming| upcoming.task == task)?;
+        if self.decided.is_some_and(|decided| decided >= task) {
+            return None;
+        }
+        let context =
+            DecisionContext { task, situation: &situation, candidates: &upcoming.candidates, model: &self.model };
+        let usable = |planner: &mut dyn Planner| {
+            let decision = planner.decide(&context)?;
+            Ok::<_, PlannerError>((decision, decision.to_task(&context)?))
+        };
+        let (decided, name, fault) = match usable(self.planner.as_mut()) {
+            Ok(decided) => (decided, self.planner.name(), None),
+            Err(error) => (usable(&mut self.fallback).ok()?, self.fallback.name(), Some(error.to_string())),
+        };
+        self.decided = Some(task);
+        let (decision, kind) = decided;
+        Some(Planned { task, situation, decision, kind, planner: name, fault })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use swath_sim::config::SimConfig;
+    use swath_sim::env::{Env, EpisodeConfig};
+
+    use super::*;
+
+    struct Broken;
+
+    impl Planner for Broken {
+        fn name(&self) -> String {
+            "broken".to_owned()
+        }
+
+        fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+            Ok(Decision::Image { candidate: context.candidates.len(), t_pre: 0 })
+        }
+    }
+
+    fn env() -> Env {
+        Env::episode(Arc::new(Model::new(SimConfig::default()).unwrap()), &EpisodeConfig::default(), 2)
+    }
+
+    fn upcoming(env: &Env, task: u64) -> Upcoming {
+        let candidates = env.context().candidates.to_vec();
+        Upcoming { task, names: vec![String::new(); candidates.len()], candidates }
+    }
+
+    #[test]
+    fn it_decides_once_when_both_halves_are_there_in_either_order() {
+        let env = env();
+        let situation = *env.context().situation;
+        let make = || PlannerLogic::new((**env.model()).clone(), Box::new(Heuristic { t_pre_s: 90.0 }));
+        let mut first = make();
+        assert_eq!(first.on_decision_point(0, situation), None);
+        let planned = first.on_upcoming(upcoming(&env, 0)).unwrap();
+        assert_eq!(first.on_decision_point(0, situation), None, "a repeated question is not answered twice");
+        let mut second = make();
+        assert_eq!(second.on_upcoming(upcoming(&env, 0)), None);
+        assert_eq!(second.on_decision_point(0, situation), Some(planned));
+        assert_eq!(second.on_decision_point(1, situation), None, "candidates of another task do not count");
+    }
+
+    #[test]
+    fn the_heuristic_takes_over_from_a_planner_that_fails() {
+        let env = env();
+        let mut logic = PlannerLogic::new((**env.model()).clone(), Box::new(Broken));
+        logic.on_decision_point(0, *env.context().situation);
+        let planned = logic.on_upcoming(upcoming(&env, 0)).unwrap();
+        assert_eq!(planned.planner, "heuristic:90");
+        assert!(planned.fault.unwrap().contains("candidate 40 was chosen of 40"));
+    }
+}

@@ -1,0 +1,3 @@
+//! The request manager: it accepts or refuses strips and offers the upcoming ones.
+
+pub mod logic;

@@ -1,0 +1,3 @@
+//! The spacecraft node: dynamics, wheels, orbit and the clock.
+
+pub mod logic;
