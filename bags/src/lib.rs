@@ -3,9 +3,11 @@
 //! A bag is a directory that rosbag2 understands: MCAP files of profile `ros2` and a
 //! `metadata.yaml`. This crate knows message types only by their schema texts.
 
+pub mod cli;
 mod error;
 mod file;
 pub mod metadata;
+pub mod ops;
 pub mod qos;
 mod reader;
 pub mod schema;

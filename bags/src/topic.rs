@@ -16,6 +16,10 @@ pub struct Topic {
     pub schema: String,
     /// `RIHS01_…`, or empty.
     pub type_hash: String,
+    /// `ros2msg`; empty when no schema is known.
+    pub schema_encoding: String,
+    /// `cdr`, as ROS 2 sends messages.
+    pub message_encoding: String,
     /// What the publishers offered.
     pub qos: Vec<QosProfile>,
     /// `qos` as the channel's metadata holds it.
@@ -39,6 +43,8 @@ impl Topic {
             name: name.to_owned(),
             type_name: type_name.to_owned(),
             schema: schema.to_owned(),
+            schema_encoding: if schema.is_empty() { "" } else { "ros2msg" }.to_owned(),
+            message_encoding: "cdr".to_owned(),
             type_hash: type_hash.to_owned(),
             qos_yaml: qos::to_yaml(&qos)?,
             qos,

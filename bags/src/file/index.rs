@@ -15,7 +15,7 @@ use crate::error::Result;
 const LOOSE_BYTES: u64 = 1 << 20;
 
 /// A schema record.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Schema {
     pub name: String,
     pub encoding: String,
@@ -68,7 +68,7 @@ impl FileIndex {
     }
 
     /// An index that knows the header only.
-    fn start(source: Source) -> Result<Self> {
+    pub(crate) fn start(source: Source) -> Result<Self> {
         let mut body = Vec::new();
         let first = Places::new(&source).next().transpose()?;
         let mut index = Self::empty(source);
@@ -190,7 +190,7 @@ impl FileIndex {
     }
 
     /// Takes in a header, schema, channel or metadata record; ignores others.
-    fn add(&mut self, place: Place, body: &[u8]) -> Result<()> {
+    pub(crate) fn add(&mut self, place: Place, body: &[u8]) -> Result<()> {
         match self.parse(place.offset, place.opcode, body)? {
             Record::Header(header) => {
                 (self.profile, self.library) = (header.profile, header.library);

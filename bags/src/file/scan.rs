@@ -58,6 +58,19 @@ impl Source {
         self.read_at(offset, out)
     }
 
+    /// Adds the bytes from `start` to `end` to a checksum.
+    pub(crate) fn update_crc(&self, start: u64, end: u64, crc: &mut crc32fast::Hasher) -> Result<()> {
+        let mut piece = Vec::new();
+        let mut offset = start;
+        while offset < end {
+            let len = (end - offset).min(1 << 20);
+            self.read_vec(offset, len, &mut piece)?;
+            crc.update(&piece);
+            offset += len;
+        }
+        Ok(())
+    }
+
     /// An error at an offset of this file.
     pub(crate) fn corrupt(&self, offset: u64, reason: impl Into<String>) -> BagError {
         BagError::Corrupt { path: self.path.clone(), offset, reason: reason.into() }

@@ -117,7 +117,7 @@ impl FileWriter {
             id: ids.channel,
             schema_id: ids.schema,
             topic: topic.name.clone(),
-            message_encoding: "cdr".to_owned(),
+            message_encoding: topic.message_encoding.clone(),
             metadata,
         };
         record::put_struct(&mut self.scratch, op::CHANNEL, &channel);

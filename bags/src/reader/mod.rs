@@ -16,8 +16,9 @@ use crate::{
     error::{BagError, Result},
     file::index::{FileIndex, Schema},
     metadata::{self, BagInformation},
-    qos,
+    qos, schema,
     topic::Topic,
+    writer::{Losses, RECORDING},
 };
 
 /// A topic of an open bag.
@@ -25,14 +26,20 @@ use crate::{
 pub struct BagTopic {
     /// Name, type, schema, QoS; the QoS is empty when its YAML is at fault.
     pub topic: Topic,
-    /// `ros2msg` in rosbag2's bags; empty when no schema was known.
-    pub schema_encoding: String,
-    /// `cdr` in ROS 2 bags.
-    pub message_encoding: String,
     /// The channel's metadata as stored.
     pub metadata: BTreeMap<String, String>,
     /// Messages in all files.
     pub messages: u64,
+}
+
+impl BagTopic {
+    /// Parses the topic's schema.
+    ///
+    /// # Errors
+    /// [`BagError::Schema`] when it is malformed.
+    pub fn parse_schema(&self) -> Result<schema::Schema> {
+        schema::Schema::parse(&self.topic.type_name, &self.topic.schema)
+    }
 }
 
 /// What one file of a bag holds.
@@ -74,12 +81,33 @@ impl Bag {
     /// [`BagError::NotABag`] when there is no MCAP file, [`BagError::Corrupt`] when one is damaged
     /// or was not closed.
     pub fn open(path: &Path) -> Result<Self> {
-        let paths = mcap_files(path)?;
-        let information = if path.is_dir() { BagInformation::read(path)? } else { None };
-        let mut files = paths.iter().map(|p| FileIndex::open(p)).collect::<Result<Vec<_>>>()?;
+        Self::open_all(&[path.to_owned()])
+    }
+
+    /// Opens several bags as one.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_all(paths: &[PathBuf]) -> Result<Self> {
+        let mut files = Vec::new();
+        for path in paths {
+            for file in mcap_files(path)? {
+                files.push(FileIndex::open(&file)?);
+            }
+        }
         files.sort_by_key(|file| (start_of(file), file.source.path.clone()));
-        let mut bag =
-            Self { path: path.to_owned(), files: Vec::new(), topics: Vec::new(), channels: Vec::new(), information };
+        let information = match paths {
+            // Only the files count; validation tells what is wrong with `metadata.yaml`.
+            [path] if path.is_dir() => BagInformation::read(path).ok().flatten(),
+            _ => None,
+        };
+        let mut bag = Self {
+            path: paths.first().cloned().unwrap_or_default(),
+            files: Vec::new(),
+            topics: Vec::new(),
+            channels: Vec::new(),
+            information,
+        };
         for file in files {
             bag.add_file(file)?;
         }
@@ -89,8 +117,8 @@ impl Bag {
 
     fn add_file(&mut self, file: FileIndex) -> Result<()> {
         let mut by_channel = BTreeMap::new();
+        let none = Schema::default();
         for (id, channel) in &file.channels {
-            let none = Schema { name: String::new(), encoding: String::new(), data: Vec::new() };
             let schema = match channel.schema_id {
                 0 => &none,
                 schema => file.schemas.get(&schema).ok_or_else(|| {
@@ -98,22 +126,7 @@ impl Bag {
                     file.source.corrupt(file.source.len, reason)
                 })?,
             };
-            let qos = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
-            let hash = channel.metadata.get("topic_type_hash").cloned().unwrap_or_default();
-            let topic = BagTopic {
-                topic: Topic {
-                    name: channel.topic.clone(),
-                    type_name: schema.name.clone(),
-                    schema: String::from_utf8_lossy(&schema.data).into_owned(),
-                    type_hash: hash,
-                    qos: qos::from_yaml(qos).unwrap_or_default(),
-                    qos_yaml: qos.to_owned(),
-                },
-                schema_encoding: schema.encoding.clone(),
-                message_encoding: channel.message_encoding.clone(),
-                metadata: channel.metadata.clone(),
-                messages: 0,
-            };
+            let topic = channel_topic(channel, schema);
             let index = self.topic_index(topic);
             self.topics[index].messages += file.counts.get(id).copied().unwrap_or(0);
             by_channel.insert(*id, index);
@@ -186,10 +199,33 @@ impl Bag {
         Some((chunks().map(|c| c.start).min()?, chunks().map(|c| c.end).max()?))
     }
 
-    /// Metadata records of all files, each name once, later files first to be heard.
-    pub fn metadata(&self) -> BTreeMap<String, BTreeMap<String, String>> {
-        let all = self.files.iter().flat_map(|f| &f.metadata);
-        all.map(|m| (m.name.clone(), m.metadata.clone())).collect()
+    /// Metadata records of all files in order, each content once.
+    pub fn metadata(&self) -> Vec<(String, BTreeMap<String, String>)> {
+        let mut records = Vec::new();
+        for metadata in self.files.iter().flat_map(|f| &f.metadata) {
+            let record = (metadata.name.clone(), metadata.metadata.clone());
+            if !records.contains(&record) {
+                records.push(record);
+            }
+        }
+        records
+    }
+
+    /// The first metadata record of a name.
+    pub fn metadata_named(&self, name: &str) -> Option<&BTreeMap<String, String>> {
+        let mut all = self.files.iter().flat_map(|f| &f.metadata);
+        all.find(|m| m.name == name).map(|m| &m.metadata)
+    }
+
+    /// Messages that were to be in the bag and are not, as its recording told.
+    pub fn losses(&self) -> Losses {
+        let mut losses = Losses::default();
+        for (name, pairs) in self.metadata() {
+            if name == RECORDING {
+                losses.add(&Losses::from_metadata(&pairs));
+            }
+        }
+        losses
     }
 
     /// `metadata.yaml`, where there is one.
@@ -203,6 +239,25 @@ impl Bag {
     /// [`BagError::Option`] when the filter names a topic that is not in the bag.
     pub fn messages(&self, filter: &Filter) -> Result<Messages<'_>> {
         Messages::new(self, filter)
+    }
+}
+
+/// A channel and its schema as a topic, without messages yet.
+pub(crate) fn channel_topic(channel: &mcap::records::Channel, schema: &Schema) -> BagTopic {
+    let qos = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
+    BagTopic {
+        topic: Topic {
+            name: channel.topic.clone(),
+            type_name: schema.name.clone(),
+            schema: String::from_utf8_lossy(&schema.data).into_owned(),
+            type_hash: channel.metadata.get("topic_type_hash").cloned().unwrap_or_default(),
+            schema_encoding: schema.encoding.clone(),
+            message_encoding: channel.message_encoding.clone(),
+            qos: qos::from_yaml(qos).unwrap_or_default(),
+            qos_yaml: qos.to_owned(),
+        },
+        metadata: channel.metadata.clone(),
+        messages: 0,
     }
 }
 

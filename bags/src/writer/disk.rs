@@ -247,7 +247,7 @@ impl Storage {
             topic_metadata: TopicMetadata {
                 name: topic.name.clone(),
                 type_name: topic.type_name.clone(),
-                serialization_format: "cdr".to_owned(),
+                serialization_format: topic.message_encoding.clone(),
                 offered_qos_profiles: topic.qos.clone(),
                 type_description_hash: topic.type_hash.clone(),
             },
@@ -448,7 +448,7 @@ mod tests {
             panic!("the disk should be full")
         };
         let bag = Bag::open(&dir).unwrap();
-        let told = Losses::from_metadata(&bag.metadata()[RECORDING]);
+        let told = bag.losses();
         assert_eq!(told.unsaved, lost);
         assert_eq!(kept + told.total(), MESSAGES);
     }

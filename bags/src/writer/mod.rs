@@ -109,7 +109,7 @@ impl Losses {
         self.by_topic.values().sum::<u64>() + self.unsaved
     }
 
-    fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.unsaved += other.unsaved;
         for (topic, n) in &other.by_topic {
             *self.by_topic.entry(topic.clone()).or_insert(0) += n;

@@ -1,0 +1,73 @@
+//! Prints messages as JSON lines.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+};
+
+use crate::{
+    error::{BagError, Result, chain},
+    reader::{Bag, BagTopic, Filter},
+    schema::{Schema, to_json},
+};
+
+/// Writes one JSON object a message: topic, type, time [s], `log_time_ns`, sequence, message.
+///
+/// A message whose type has no schema, or whose bytes do not fit it, has `error` instead of
+/// `message`. Returns the number of messages written.
+///
+/// # Errors
+/// [`BagError::Io`] when `out` refuses, [`BagError::Corrupt`] when a chunk is damaged.
+pub fn cat(bag: &Bag, filter: &Filter, limit: Option<u64>, out: &mut dyn Write) -> Result<u64> {
+    let mut schemas: BTreeMap<usize, Result<Schema, String>> = BTreeMap::new();
+    let mut messages = bag.messages(filter)?;
+    let mut line = Vec::new();
+    let mut written = 0;
+    while limit.is_none_or(|limit| written < limit)
+        && let Some(message) = messages.next()?
+    {
+        let topic = &bag.topics()[message.topic];
+        let schema = schemas.entry(message.topic).or_insert_with(|| schema_of(topic));
+        line.clear();
+        let (name, kind) = (&topic.topic.name, &topic.topic.type_name);
+        let start = serde_json::json!({ "topic": name, "type": kind }).to_string();
+        line.extend_from_slice(start.trim_end_matches('}').as_bytes());
+        let (seconds, nanoseconds) = (message.log_time / 1_000_000_000, message.log_time % 1_000_000_000);
+        let (time, sequence) = (message.log_time, message.sequence);
+        let times = format!(",\"time\":{seconds}.{nanoseconds:09},\"log_time_ns\":{time},\"sequence\":{sequence},");
+        line.extend_from_slice(times.as_bytes());
+        put_message(schema.as_ref(), message.data, &mut line);
+        line.extend_from_slice(b"}\n");
+        out.write_all(&line).map_err(cannot_print)?;
+        written += 1;
+    }
+    out.flush().map_err(cannot_print)?;
+    Ok(written)
+}
+
+/// The parsed schema of a topic, or why there is none.
+fn schema_of(topic: &BagTopic) -> Result<Schema, String> {
+    if topic.topic.schema_encoding != "ros2msg" {
+        return Err(format!("no schema known for {}", topic.topic.type_name));
+    }
+    topic.parse_schema().map_err(|e| chain(&e))
+}
+
+fn put_message(schema: Result<&Schema, &String>, data: &[u8], line: &mut Vec<u8>) {
+    let start = line.len();
+    line.extend_from_slice(b"\"message\":");
+    let error = match schema {
+        Ok(schema) => match to_json(schema, data, line) {
+            Ok(()) => return,
+            Err(error) => chain(&error),
+        },
+        Err(error) => error.clone(),
+    };
+    line.truncate(start);
+    let error = serde_json::Value::from(error);
+    line.extend_from_slice(format!("\"error\":{error}").as_bytes());
+}
+
+fn cannot_print(source: io::Error) -> BagError {
+    BagError::Io { action: "write to", path: "standard output".into(), source }
+}
