@@ -1,0 +1,302 @@
+//! Checkpoints: a run's whole state in one file, from which it goes on exactly.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::config::RunConfig;
+use crate::environment::Action;
+use crate::error::{Result, TrainingError};
+use crate::parameters::Layout;
+use crate::rollout::SlotState;
+use crate::store::{self, Content};
+use crate::trainer::{Trainer, TrainerState};
+
+/// The program's revision in version control.
+pub const REVISION: &str = env!("SWATH_REVISION");
+
+/// What a file of weights says about itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// `checkpoint` or `policy`.
+    pub content: String,
+    /// Version of the file's structure.
+    pub version: u32,
+    /// The run that made it.
+    pub run: RunConfig,
+    /// Environment steps taken.
+    pub steps: u64,
+    /// Revision of the program that wrote it.
+    pub revision: String,
+    /// Adam's steps.
+    pub adam_steps: u64,
+    /// Bits of the KL penalty's weight.
+    pub kl_coefficient_bits: u64,
+}
+
+/// Version of the files that this program reads and writes.
+const VERSION: u32 = 1;
+/// Bytes of a stored generator: seed, stream, position.
+const RNG_BYTES: usize = 32 + 8 + 16;
+
+/// Writes everything that is needed to go on with the run.
+pub fn save(trainer: &Trainer, path: &Path) -> Result<()> {
+    let state = trainer.state()?;
+    let mut content = weights(trainer, &state, "checkpoint")?;
+    content.insert("adam.first", &[state.first.len()], &state.first);
+    content.insert("adam.second", &[state.second.len()], &state.second);
+    content.insert("learner.rng", &[RNG_BYTES], &rng_bytes(&state.rng));
+    let slots = &state.slots;
+    let rngs: Vec<u8> = slots.iter().flat_map(|slot| rng_bytes(&slot.rng)).collect();
+    let seeds: Vec<u64> = slots.iter().map(|slot| slot.seed).collect();
+    let lengths: Vec<u64> = slots.iter().map(|slot| slot.actions.len() as u64).collect();
+    let actions = || slots.iter().flat_map(|slot| &slot.actions);
+    let tokens: Vec<u64> = actions().map(|action| action.token as u64).collect();
+    let parameters: Vec<f64> = actions().map(|action| action.parameter).collect();
+    content.insert("environments.rng", &[slots.len(), RNG_BYTES], &rngs);
+    content.insert("environments.seed", &[slots.len()], &seeds);
+    content.insert("environments.length", &[slots.len()], &lengths);
+    content.insert("environments.token", &[tokens.len()], &tokens);
+    content.insert("environments.parameter", &[parameters.len()], &parameters);
+    store::write_atomically(path, &content.to_bytes()?)
+}
+
+/// Writes the weights alone: a policy to fly.
+pub fn save_policy(trainer: &Trainer, path: &Path) -> Result<()> {
+    let content = weights(trainer, &trainer.state()?, "policy")?;
+    store::write_atomically(path, &content.to_bytes()?)
+}
+
+/// Reads a checkpoint of `run`.
+///
+/// # Errors
+/// A file that is damaged, is no checkpoint, or belongs to a run with other settings.
+pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerState> {
+    let content = Content::read(path)?;
+    let header = header(&content, path)?;
+    if header.content != "checkpoint" {
+        return Err(TrainingError::damaged(
+            path,
+            format!("it is a {}", header.content),
+        ));
+    }
+    check_same_run(&header.run, run, path)?;
+    let state = TrainerState {
+        weights: flat_weights(&content, layout, path)?,
+        first: content.numbers("adam.first", path)?,
+        second: content.numbers("adam.second", path)?,
+        adam_steps: header.adam_steps,
+        kl_coefficient: f64::from_bits(header.kl_coefficient_bits),
+        steps: header.steps,
+        rng: rng_from(&content.numbers("learner.rng", path)?, path)?,
+        slots: slots(&content, path)?,
+    };
+    let sizes = [
+        ("adam.first", state.first.len(), layout.count()),
+        ("adam.second", state.second.len(), layout.count()),
+        (
+            "environments.rng",
+            state.slots.len(),
+            run.rollout.environments,
+        ),
+    ];
+    for (name, found, wanted) in sizes {
+        if found != wanted {
+            let reason = format!("{name} has {found} entries instead of {wanted}");
+            return Err(TrainingError::damaged(path, reason));
+        }
+    }
+    Ok(state)
+}
+
+/// The header of a checkpoint or policy.
+pub fn header(content: &Content, path: &Path) -> Result<Header> {
+    let header: Header = serde_json::from_str(&content.header)
+        .map_err(|error| TrainingError::damaged(path, error))?;
+    if header.version != VERSION {
+        let reason = format!("its version is {}, not {VERSION}", header.version);
+        return Err(TrainingError::damaged(path, reason));
+    }
+    Ok(header)
+}
+
+/// The weights of a file as one vector in the layout's order.
+pub fn flat_weights(content: &Content, layout: &Layout, path: &Path) -> Result<Vec<f32>> {
+    let mut flat = Vec::with_capacity(layout.count());
+    for (name, shape) in layout.entries() {
+        let numbers: Vec<f32> = content.numbers(name, path)?;
+        let wanted = shape.iter().product::<i64>() as usize;
+        if numbers.len() != wanted {
+            let reason = format!("{name} has {} numbers instead of {wanted}", numbers.len());
+            return Err(TrainingError::damaged(path, reason));
+        }
+        flat.extend(numbers);
+    }
+    Ok(flat)
+}
+
+/// The newest checkpoint of a folder.
+///
+/// # Errors
+/// When there is none.
+pub fn newest(folder: &Path) -> Result<PathBuf> {
+    let none = || TrainingError::NoCheckpoint {
+        path: folder.to_path_buf(),
+    };
+    list(folder)?.pop().ok_or_else(none)
+}
+
+/// The checkpoints of a folder, oldest first; none when the folder is not there.
+pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(found),
+        entries => entries.map_err(TrainingError::file("read", folder))?,
+    };
+    for entry in entries {
+        let path = entry.map_err(TrainingError::file("read", folder))?.path();
+        let name = path.file_name().and_then(|name| name.to_str());
+        if name.is_some_and(|name| name.starts_with("step-") && name.ends_with(".safetensors")) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// The name of the checkpoint after some steps; names sort by steps.
+pub fn file_name(steps: u64) -> String {
+    format!("step-{steps:012}.safetensors")
+}
+
+fn weights(trainer: &Trainer, state: &TrainerState, content: &str) -> Result<Content> {
+    let header = Header {
+        content: content.into(),
+        version: VERSION,
+        run: trainer.run().clone(),
+        steps: state.steps,
+        revision: REVISION.into(),
+        adam_steps: state.adam_steps,
+        kl_coefficient_bits: state.kl_coefficient.to_bits(),
+    };
+    let mut content = Content {
+        header: store::json(&header)?,
+        tensors: BTreeMap::new(),
+    };
+    let mut offset = 0;
+    for (name, shape) in trainer.layout().entries() {
+        let shape: Vec<usize> = shape.iter().map(|&size| size as usize).collect();
+        let length: usize = shape.iter().product();
+        content.insert(name, &shape, &state.weights[offset..offset + length]);
+        offset += length;
+    }
+    Ok(content)
+}
+
+fn slots(content: &Content, path: &Path) -> Result<Vec<SlotState>> {
+    let rngs: Vec<u8> = content.numbers("environments.rng", path)?;
+    let seeds: Vec<u64> = content.numbers("environments.seed", path)?;
+    let lengths: Vec<u64> = content.numbers("environments.length", path)?;
+    let tokens: Vec<u64> = content.numbers("environments.token", path)?;
+    let parameters: Vec<f64> = content.numbers("environments.parameter", path)?;
+    let consistent = rngs.len() == seeds.len() * RNG_BYTES
+        && lengths.len() == seeds.len()
+        && lengths.iter().sum::<u64>() == tokens.len() as u64
+        && tokens.len() == parameters.len();
+    if !consistent {
+        let reason = "its environments' tensors do not fit each other";
+        return Err(TrainingError::damaged(path, reason));
+    }
+    let mut actions = tokens
+        .iter()
+        .zip(&parameters)
+        .map(|(&token, &parameter)| Action {
+            token: token as usize,
+            parameter,
+        });
+    let mut slots = Vec::with_capacity(seeds.len());
+    for ((rng, seed), length) in rngs.chunks(RNG_BYTES).zip(seeds).zip(lengths) {
+        slots.push(SlotState {
+            rng: rng_from(rng, path)?,
+            seed,
+            actions: actions.by_ref().take(length as usize).collect(),
+        });
+    }
+    Ok(slots)
+}
+
+fn rng_bytes(rng: &ChaCha8Rng) -> Vec<u8> {
+    let mut bytes = rng.get_seed().to_vec();
+    bytes.extend(rng.get_stream().to_le_bytes());
+    bytes.extend(rng.get_word_pos().to_le_bytes());
+    bytes
+}
+
+fn rng_from(bytes: &[u8], path: &Path) -> Result<ChaCha8Rng> {
+    let part = |from: usize, to: usize| bytes.get(from..to);
+    let seed = part(0, 32).and_then(|it| <[u8; 32]>::try_from(it).ok());
+    let stream = part(32, 40).and_then(|it| <[u8; 8]>::try_from(it).ok());
+    let position = part(40, RNG_BYTES).and_then(|it| <[u8; 16]>::try_from(it).ok());
+    let (Some(seed), Some(stream), Some(position)) = (seed, stream, position) else {
+        return Err(TrainingError::damaged(
+            path,
+            "a generator's state is cut short",
+        ));
+    };
+    let mut rng = ChaCha8Rng::from_seed(seed);
+    rng.set_stream(u64::from_le_bytes(stream));
+    rng.set_word_pos(u128::from_le_bytes(position));
+    Ok(rng)
+}
+
+/// Settings that may differ between a checkpoint and the run that goes on from it.
+const MAY_DIFFER: [&str; 2] = ["steps", "checkpoint_every"];
+
+fn check_same_run(found: &RunConfig, wanted: &RunConfig, path: &Path) -> Result<()> {
+    let (found, wanted) = (settings(found)?, settings(wanted)?);
+    let keys = found.keys().chain(wanted.keys());
+    let Some(key) = keys.min_by_key(|key| (found.get(*key) == wanted.get(*key), *key)) else {
+        return Ok(());
+    };
+    if found.get(key) == wanted.get(key) {
+        return Ok(());
+    }
+    let shown = |entries: &BTreeMap<String, String>| {
+        entries.get(key).cloned().unwrap_or_else(|| "absent".into())
+    };
+    Err(TrainingError::Mismatch {
+        path: path.to_path_buf(),
+        key: key.clone(),
+        found: shown(&found),
+        wanted: shown(&wanted),
+    })
+}
+
+/// Dotted keys and values of a run, less what may differ.
+fn settings(run: &RunConfig) -> Result<BTreeMap<String, String>> {
+    let value =
+        serde_json::to_value(run).map_err(|error| TrainingError::Environment(error.to_string()))?;
+    let mut entries = BTreeMap::new();
+    flatten("", &value, &mut entries);
+    entries.retain(|key, _| !MAY_DIFFER.contains(&key.as_str()));
+    Ok(entries)
+}
+
+fn flatten(prefix: &str, value: &Value, entries: &mut BTreeMap<String, String>) {
+    match value {
+        Value::Object(map) => {
+            for (key, value) in map {
+                let dot = if prefix.is_empty() { "" } else { "." };
+                flatten(&format!("{prefix}{dot}{key}"), value, entries);
+            }
+        }
+        Value::Null => {}
+        value => {
+            entries.insert(prefix.to_owned(), value.to_string());
+        }
+    }
+}

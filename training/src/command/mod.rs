@@ -1,0 +1,3 @@
+//! The commands of `swath-train`.
+
+pub mod train;

@@ -1,0 +1,36 @@
+//! `swath-train`: trains, evaluates and compares strip planners.
+
+mod command;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use swath_training::process;
+
+/// Trains, evaluates and compares strip planners.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Train a planner, or go on with a run
+    Train(command::train::TrainArgs),
+}
+
+fn main() -> ExitCode {
+    process::prepare();
+    let outcome = match Cli::parse().command {
+        Command::Train(args) => command::train::train(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

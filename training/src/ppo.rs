@@ -1,0 +1,369 @@
+//! Proximal policy optimisation of a hybrid policy: one batch of experience in, better weights out.
+
+use rand::Rng;
+use rand::seq::SliceRandom;
+use rayon::prelude::*;
+use tch::{Device, Kind, Tensor};
+
+use crate::adam::Adam;
+use crate::config::PpoConfig;
+use crate::distribution::{self, SquashedGaussian};
+use crate::environment::ObservationShape;
+use crate::error::{Result, TrainingError};
+use crate::network::{Network, Observations};
+use crate::parameters::Parameters;
+use crate::rollout::{self, Segment};
+
+/// The learner's state besides the weights.
+#[derive(Debug)]
+pub struct Ppo {
+    /// Hyperparameters.
+    pub config: PpoConfig,
+    /// Optimiser.
+    pub adam: Adam,
+    /// Present weight of the KL penalty; 0 when there is none.
+    pub kl_coefficient: f64,
+}
+
+/// The loss that is made small.
+struct Objective<'a> {
+    config: &'a PpoConfig,
+    kl_coefficient: f64,
+    network: &'a Network,
+}
+
+/// Experience as tensors, with what the policy that gathered it said. All have one row a decision.
+#[derive(Debug)]
+struct Batch {
+    observations: Observations,
+    choice: Tensor,
+    latent: Tensor,
+    log_probabilities: Tensor,
+    gaussian: SquashedGaussian,
+    log_density: Tensor,
+    /// Advantages, standardised.
+    advantage: Tensor,
+    /// What the critic should have said.
+    value: Tensor,
+}
+
+/// Means over an update.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct UpdateStatistics {
+    /// Clipped surrogate, to be made large.
+    pub surrogate: f64,
+    /// Squared error of the critic.
+    pub value_loss: f64,
+    /// KL divergence of the new policy from the old one, over the last pass.
+    pub kl: f64,
+    /// Share of the decisions whose ratio was clipped.
+    pub clip_fraction: f64,
+    /// Entropy of the discrete actor [nat].
+    pub entropy: f64,
+    /// Entropy of the continuous actor before squashing [nat].
+    pub transition_entropy: f64,
+    /// Global norm of the gradient before clipping.
+    pub gradient_norm: f64,
+    /// Share of the returns' variance that the critic explained before the update.
+    pub explained_variance: f64,
+    /// Passes over the batch.
+    pub epochs: f64,
+}
+
+/// Sums over a shard's decisions, in the order of [`SUMS`] entries of a tensor.
+const SUMS: usize = 6;
+
+impl Ppo {
+    /// A fresh learner for `count` weights.
+    pub fn new(config: PpoConfig, count: usize, device: Device) -> Ppo {
+        let kl_coefficient = config.kl_penalty.map_or(0.0, |penalty| penalty.coefficient);
+        Ppo {
+            adam: Adam::new(count, device),
+            kl_coefficient,
+            config,
+        }
+    }
+
+    /// Improves the weights by several passes over a batch of experience.
+    ///
+    /// # Errors
+    /// A gradient that is not finite; `step` is named in the error.
+    pub fn update(
+        &mut self,
+        network: &Network,
+        parameters: &mut Parameters,
+        segments: &[Segment],
+        learning_rate: f64,
+        rng: &mut impl Rng,
+        step: u64,
+    ) -> Result<UpdateStatistics> {
+        let device = parameters.flat.device();
+        let batch = Batch::new(network, segments, device)?;
+        let mut order: Vec<i64> = (0..batch.len() as i64).collect();
+        let mut statistics = UpdateStatistics {
+            explained_variance: explained_variance(segments),
+            ..UpdateStatistics::default()
+        };
+        let (mut sums, mut norm, mut minibatches) = ([0.0; SUMS], 0.0, 0.0);
+        for _ in 0..self.config.epochs {
+            order.shuffle(rng);
+            let mut kl = 0.0;
+            for minibatch in order.chunks(self.config.minibatch) {
+                let (gradient, shard_sums) =
+                    self.gradient(network, parameters, &batch, minibatch)?;
+                let length = gradient.norm().double_value(&[]);
+                if !length.is_finite() {
+                    let quantity = "the gradient";
+                    return Err(TrainingError::NotFinite { quantity, step });
+                }
+                let scale = (self.config.gradient_norm / (length + 1e-6)).min(1.0);
+                self.adam
+                    .step(parameters, &(gradient * scale), learning_rate);
+                for (sum, shard_sum) in sums.iter_mut().zip(shard_sums) {
+                    *sum += shard_sum;
+                }
+                kl += shard_sums[2];
+                norm += length;
+                minibatches += 1.0;
+            }
+            statistics.kl = kl / batch.len() as f64;
+            statistics.epochs += 1.0;
+            if self
+                .config
+                .kl_stop
+                .is_some_and(|limit| statistics.kl > limit)
+            {
+                break;
+            }
+        }
+        let decisions = batch.len() as f64 * statistics.epochs;
+        statistics.surrogate = sums[0] / decisions;
+        statistics.value_loss = sums[1] / decisions;
+        statistics.clip_fraction = sums[3] / decisions;
+        statistics.entropy = sums[4] / decisions;
+        statistics.transition_entropy = sums[5] / decisions;
+        statistics.gradient_norm = norm / minibatches;
+        self.adapt_kl(statistics.kl);
+        Ok(statistics)
+    }
+
+    /// Gradient of the mean loss over a minibatch, and sums of its parts: the minibatch is cut into
+    /// shards that threads share, and their gradients are added in a fixed order.
+    fn gradient(
+        &self,
+        network: &Network,
+        parameters: &Parameters,
+        batch: &Batch,
+        minibatch: &[i64],
+    ) -> Result<(Tensor, [f64; SUMS])> {
+        let shard = minibatch.len().div_ceil(self.config.shards);
+        let objective = Objective {
+            config: &self.config,
+            kl_coefficient: self.kl_coefficient,
+            network,
+        };
+        let tasks: Vec<(Parameters, Batch)> = minibatch
+            .chunks(shard)
+            .map(|rows| (parameters.share(), batch.rows(rows)))
+            .collect();
+        let results: Vec<Result<(Tensor, [f64; SUMS])>> = tasks
+            .into_par_iter()
+            .map(|(parameters, rows)| {
+                let (loss, sums) = objective.loss(&parameters, &rows);
+                let gradient = parameters.gradient(&(loss / minibatch.len() as f64))?;
+                let sums = rollout::to_vec(&sums)?;
+                Ok((
+                    gradient,
+                    std::array::from_fn(|index| f64::from(sums[index])),
+                ))
+            })
+            .collect();
+        let mut total: Option<(Tensor, [f64; SUMS])> = None;
+        for result in results {
+            let (gradient, sums) = result?;
+            total = Some(match total {
+                None => (gradient, sums),
+                Some((so_far, so_far_sums)) => (
+                    so_far + gradient,
+                    std::array::from_fn(|index| so_far_sums[index] + sums[index]),
+                ),
+            });
+        }
+        total.ok_or_else(|| TrainingError::Environment("a minibatch is empty".into()))
+    }
+
+    fn adapt_kl(&mut self, kl: f64) {
+        if let Some(penalty) = self.config.kl_penalty {
+            if kl > 2.0 * penalty.target {
+                self.kl_coefficient *= 1.5;
+            } else if kl < 0.5 * penalty.target {
+                self.kl_coefficient *= 0.5;
+            }
+        }
+    }
+}
+
+impl Objective<'_> {
+    /// Sum of the loss over some decisions (eqs 16, 17, 20), and the sums that are reported.
+    fn loss(&self, parameters: &Parameters, batch: &Batch) -> (Tensor, Tensor) {
+        let (config, network) = (self.config, self.network);
+        let assessment = network.assess(parameters, &batch.observations);
+        let logs = distribution::log_probabilities(&assessment.logits);
+        let old = &batch.log_probabilities;
+        let choice_ratio =
+            distribution::chosen(&logs, &batch.choice) - distribution::chosen(old, &batch.choice);
+        let entropy = distribution::entropy(&logs);
+        let mut kl = distribution::categorical_kl(old, &logs);
+        let transition =
+            network.transition(parameters, &batch.observations, &assessment, &batch.choice);
+        let mut transition_entropy = entropy.zeros_like();
+        let (surrogate, clipped) = match transition {
+            None => self.surrogate(&choice_ratio, &batch.advantage),
+            Some(gaussian) => {
+                let transition_ratio = gaussian.log_density(&batch.latent) - &batch.log_density;
+                kl += batch.gaussian.kl(&gaussian);
+                transition_entropy = gaussian.latent_entropy();
+                if network.has_separate_objectives() {
+                    let (a, clipped_a) = self.surrogate(&choice_ratio, &batch.advantage);
+                    let (b, clipped_b) = self.surrogate(&transition_ratio, &batch.advantage);
+                    (a + b, (clipped_a + clipped_b) * 0.5)
+                } else {
+                    self.surrogate(&(choice_ratio + transition_ratio), &batch.advantage)
+                }
+            }
+        };
+        let error = (&assessment.value - &batch.value).square();
+        let error = match config.value_clamp {
+            Some(limit) => error.clamp_max(limit),
+            None => error,
+        };
+        let parts = [
+            &surrogate,
+            &error,
+            &kl,
+            &clipped,
+            &entropy,
+            &transition_entropy,
+        ];
+        let sums = Tensor::stack(&parts, 0).sum_dim_intlist(-1, false, Kind::Float);
+        let weights = [
+            -1.0,
+            config.value_coefficient,
+            self.kl_coefficient,
+            0.0,
+            -config.entropy_coefficient,
+            -config.transition_entropy_coefficient,
+        ];
+        let weights = Tensor::from_slice(&weights)
+            .to_kind(Kind::Float)
+            .to_device(sums.device());
+        ((&sums * weights).sum(Kind::Float), sums.detach())
+    }
+
+    /// The clipped surrogate of each decision (eq. 16), and 1 where the ratio is clipped.
+    fn surrogate(&self, log_ratio: &Tensor, advantage: &Tensor) -> (Tensor, Tensor) {
+        let clip = self.config.clip;
+        let ratio = log_ratio.exp();
+        let clipped = ratio.clamp(1.0 - clip, 1.0 + clip);
+        let outside = (ratio.detach() - 1.0).abs().gt(clip).to_kind(Kind::Float);
+        ((ratio * advantage).minimum(&(clipped * advantage)), outside)
+    }
+}
+
+impl Batch {
+    fn new(network: &Network, segments: &[Segment], device: Device) -> Result<Batch> {
+        let ObservationShape { tokens, features } = network.shape();
+        let join = |part: fn(&Segment) -> &[f32]| {
+            let joined: Vec<f32> = segments.iter().flat_map(part).copied().collect();
+            Tensor::from_slice(&joined).to_device(device)
+        };
+        let valid: Vec<bool> = segments.iter().flat_map(|it| &it.valid).copied().collect();
+        let choice: Vec<i64> = segments.iter().flat_map(|it| &it.choice).copied().collect();
+        let shape = [-1, tokens as i64, features as i64];
+        let padded = !valid.iter().all(|&valid| valid);
+        let observations = Observations {
+            features: join(|it| &it.features).view(shape),
+            valid: padded.then(|| {
+                Tensor::from_slice(&valid)
+                    .view([-1, tokens as i64])
+                    .to_device(device)
+            }),
+        };
+        let logits = join(|it| &it.logits).view([-1, network.choices() as i64]);
+        let latent = join(|it| &it.latent);
+        let gaussian = SquashedGaussian::from_outputs(&join(|it| &it.gaussian).view([-1, 2]));
+        let (advantage, value) = (join(|it| &it.advantage), join(|it| &it.value));
+        Ok(Batch {
+            observations,
+            choice: Tensor::from_slice(&choice).to_device(device),
+            log_probabilities: distribution::log_probabilities(&logits),
+            log_density: gaussian.log_density(&latent),
+            value: &advantage + value,
+            advantage: standardised(&advantage),
+            gaussian,
+            latent,
+        })
+    }
+
+    fn len(&self) -> usize {
+        self.choice.size()[0] as usize
+    }
+
+    fn rows(&self, rows: &[i64]) -> Batch {
+        let index = Tensor::from_slice(rows).to_device(self.choice.device());
+        let pick = |tensor: &Tensor| tensor.index_select(0, &index);
+        Batch {
+            observations: Observations {
+                features: pick(&self.observations.features),
+                valid: self.observations.valid.as_ref().map(pick),
+            },
+            choice: pick(&self.choice),
+            latent: pick(&self.latent),
+            log_probabilities: pick(&self.log_probabilities),
+            gaussian: SquashedGaussian {
+                mean: pick(&self.gaussian.mean),
+                log_deviation: pick(&self.gaussian.log_deviation),
+            },
+            log_density: pick(&self.log_density),
+            advantage: pick(&self.advantage),
+            value: pick(&self.value),
+        }
+    }
+}
+
+/// To mean 0 and deviation 1.
+fn standardised(x: &Tensor) -> Tensor {
+    let centred = x - x.mean(Kind::Float);
+    let deviation = centred.square().mean(Kind::Float).sqrt();
+    centred / (deviation + 1e-8)
+}
+
+/// 1 − variance of (return − value) / variance of the returns; 0 when all returns are equal.
+fn explained_variance(segments: &[Segment]) -> f64 {
+    let errors = || {
+        segments
+            .iter()
+            .flat_map(|it| &it.advantage)
+            .map(|&x| f64::from(x))
+    };
+    let values = segments
+        .iter()
+        .flat_map(|it| &it.value)
+        .map(|&x| f64::from(x));
+    let returns: Vec<f64> = errors()
+        .zip(values)
+        .map(|(error, value)| error + value)
+        .collect();
+    let spread = variance(returns.iter().copied());
+    if spread > 0.0 {
+        1.0 - variance(errors()) / spread
+    } else {
+        0.0
+    }
+}
+
+fn variance(numbers: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = numbers.clone().count() as f64;
+    let mean = numbers.clone().sum::<f64>() / count;
+    numbers.map(|x| (x - mean).powi(2)).sum::<f64>() / count
+}

@@ -1,0 +1,381 @@
+//! Experience: environments stepped in lockstep groups, one batched inference a step.
+//!
+//! Groups are fixed by the configuration and each environment draws from its own generator, so
+//! what comes out does not depend on how many threads share the groups.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tch::{Device, Tensor};
+
+use crate::distribution::{sample_choice, sample_latent, squash};
+use crate::environment::{Action, Environment, ObservationShape, Progress};
+use crate::error::{Result, TrainingError};
+use crate::gae::{self, Next};
+use crate::network::{Network, Observations};
+use crate::parameters::Parameters;
+
+/// What an episode has brought so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tally {
+    /// Sum of rewards.
+    pub reward: f64,
+    /// Time flown [s].
+    pub duration_s: f64,
+    /// Decisions taken.
+    pub attempts: u64,
+    /// Attempts that succeeded.
+    pub successes: u64,
+    /// Sum of the parameters of all actions.
+    pub parameters: f64,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Tally) {
+        self.reward += other.reward;
+        self.duration_s += other.duration_s;
+        self.attempts += other.attempts;
+        self.successes += other.successes;
+        self.parameters += other.parameters;
+    }
+}
+
+/// One environment with its generator and the history that reproduces its present state.
+pub struct Slot {
+    environment: Box<dyn Environment>,
+    rng: ChaCha8Rng,
+    seed: u64,
+    actions: Vec<Action>,
+    tally: Tally,
+}
+
+/// What is saved of a [`Slot`]: replaying the actions from the seed gives its state back exactly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SlotState {
+    /// The generator.
+    pub rng: ChaCha8Rng,
+    /// Seed of the present episode.
+    pub seed: u64,
+    /// Actions taken in it.
+    pub actions: Vec<Action>,
+}
+
+impl Slot {
+    /// Begins a first episode; streams of one seed are independent of each other.
+    pub fn new(mut environment: Box<dyn Environment>, seed: u64, stream: u64) -> Result<Slot> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        let first = rng.random();
+        environment.reset(first)?;
+        Ok(Slot {
+            environment,
+            rng,
+            seed: first,
+            actions: Vec::new(),
+            tally: Tally::default(),
+        })
+    }
+
+    /// Brings an environment back to a saved state.
+    pub fn restore(environment: Box<dyn Environment>, state: SlotState) -> Result<Slot> {
+        let mut slot = Slot {
+            environment,
+            rng: state.rng,
+            seed: state.seed,
+            actions: Vec::with_capacity(state.actions.len()),
+            tally: Tally::default(),
+        };
+        slot.environment.reset(slot.seed)?;
+        for action in state.actions {
+            if slot.step(action)?.progress != Progress::Continues {
+                return Err(TrainingError::Environment(
+                    "a saved episode ends before its last action".into(),
+                ));
+            }
+        }
+        Ok(slot)
+    }
+
+    /// What must be saved.
+    pub fn state(&self) -> SlotState {
+        SlotState {
+            rng: self.rng.clone(),
+            seed: self.seed,
+            actions: self.actions.clone(),
+        }
+    }
+
+    fn step(&mut self, action: Action) -> Result<crate::environment::Outcome> {
+        let outcome = self.environment.step(action)?;
+        self.actions.push(action);
+        self.tally += Tally {
+            reward: outcome.reward,
+            duration_s: outcome.duration_s,
+            attempts: 1,
+            successes: u64::from(outcome.success),
+            parameters: action.parameter,
+        };
+        Ok(outcome)
+    }
+
+    /// Begins the next episode and returns what the last one brought.
+    fn begin(&mut self) -> Result<Tally> {
+        self.seed = self.rng.random();
+        self.environment.reset(self.seed)?;
+        self.actions.clear();
+        Ok(std::mem::take(&mut self.tally))
+    }
+}
+
+/// Environments that are stepped together.
+pub struct Group {
+    slots: Vec<Slot>,
+    shape: ObservationShape,
+}
+
+/// What a group experienced: `steps` × environments entries, in the order of time.
+#[derive(Debug, Default)]
+pub struct Segment {
+    /// Entries × tokens × features.
+    pub features: Vec<f32>,
+    /// Entries × tokens.
+    pub valid: Vec<bool>,
+    /// Logits of all choices at the time: entries × choices.
+    pub logits: Vec<f32>,
+    /// The choice taken.
+    pub choice: Vec<i64>,
+    /// The latent of the transition; 0 without a continuous actor.
+    pub latent: Vec<f32>,
+    /// Mean and log-deviation that the latent was drawn with: entries × 2.
+    pub gaussian: Vec<f32>,
+    /// The critic's value.
+    pub value: Vec<f32>,
+    /// Advantage estimate (eq. 23).
+    pub advantage: Vec<f32>,
+    /// Episodes that ended.
+    pub finished: Vec<Tally>,
+    /// Sums over all entries.
+    pub tally: Tally,
+}
+
+/// Discount per second and λ of the advantage estimate.
+#[derive(Debug, Clone, Copy)]
+pub struct Discount {
+    /// γ, per second.
+    pub gamma: f64,
+    /// λ.
+    pub lambda: f64,
+}
+
+/// The policy as rollouts use it.
+pub struct Actor<'a> {
+    /// Structure.
+    pub network: &'a Network,
+    /// Weights.
+    pub parameters: Parameters,
+    /// Where the weights are.
+    pub device: Device,
+}
+
+impl Group {
+    /// Environments of the same shape.
+    pub fn new(slots: Vec<Slot>, shape: ObservationShape) -> Group {
+        Group { slots, shape }
+    }
+
+    /// The environments.
+    pub fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    /// Steps every environment `steps` times with actions drawn from the policy.
+    pub fn collect(&mut self, actor: &Actor, steps: usize, discount: Discount) -> Result<Segment> {
+        let _guard = tch::no_grad_guard();
+        let mut segment = Segment::default();
+        let mut decisions: Vec<Vec<gae::Decision>> =
+            vec![Vec::with_capacity(steps); self.slots.len()];
+        let mut last = Ends::default();
+        for _ in 0..steps {
+            self.step_all(actor, &mut segment, &mut decisions, &mut last)?;
+        }
+        for (index, slot) in self.slots.iter().enumerate() {
+            if decisions[index]
+                .last()
+                .is_some_and(|it| it.next == Next::Decision)
+            {
+                last.note(slot, self.shape, (index, steps - 1))?;
+            }
+        }
+        last.evaluate(actor, self.shape, &mut decisions)?;
+        segment.advantage = vec![0.0; steps * self.slots.len()];
+        for (index, sequence) in decisions.iter().enumerate() {
+            let advantages = gae::advantages(sequence, discount.gamma, discount.lambda);
+            for (step, advantage) in advantages.into_iter().enumerate() {
+                segment.advantage[step * self.slots.len() + index] = advantage as f32;
+            }
+        }
+        Ok(segment)
+    }
+
+    fn step_all(
+        &mut self,
+        actor: &Actor,
+        segment: &mut Segment,
+        decisions: &mut [Vec<gae::Decision>],
+        last: &mut Ends,
+    ) -> Result<()> {
+        let (features, valid) = self.observe(segment)?;
+        let seen = observations(features, valid, self.shape, actor.device);
+        let first = segment.choice.len();
+        self.draw(actor, &seen, segment)?;
+        for (index, slot) in self.slots.iter_mut().enumerate() {
+            let entry = first + index;
+            let (token, fixed) = actor.network.decode(segment.choice[entry] as usize);
+            let parameter = fixed.unwrap_or_else(|| squash(segment.latent[entry]));
+            let outcome = slot.step(Action { token, parameter })?;
+            segment.tally += Tally {
+                reward: outcome.reward,
+                duration_s: outcome.duration_s,
+                attempts: 1,
+                successes: u64::from(outcome.success),
+                parameters: parameter,
+            };
+            decisions[index].push(gae::Decision {
+                reward: outcome.reward,
+                duration_s: outcome.duration_s,
+                value: f64::from(segment.value[entry]),
+                next: match outcome.progress {
+                    Progress::Continues => Next::Decision,
+                    Progress::Terminated => Next::Terminated,
+                    Progress::Truncated => Next::Cut { value: 0.0 },
+                },
+            });
+            if outcome.progress == Progress::Truncated {
+                last.note(slot, self.shape, (index, decisions[index].len() - 1))?;
+            }
+            if outcome.progress != Progress::Continues {
+                segment.finished.push(slot.begin()?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends every environment's observation to the segment and returns the appended part.
+    fn observe<'s>(&self, segment: &'s mut Segment) -> Result<(&'s [f32], &'s [bool])> {
+        let (numbers, tokens) = (self.shape.len(), self.shape.tokens);
+        let first = segment.choice.len();
+        let end = first + self.slots.len();
+        segment.features.resize(end * numbers, 0.0);
+        segment.valid.resize(end * tokens, false);
+        for (slot, entry) in self.slots.iter().zip(first..) {
+            let features = &mut segment.features[entry * numbers..][..numbers];
+            let valid = &mut segment.valid[entry * tokens..][..tokens];
+            slot.environment.observe(features, valid)?;
+        }
+        Ok((
+            &segment.features[first * numbers..],
+            &segment.valid[first * tokens..],
+        ))
+    }
+
+    /// Draws a choice and a latent for every environment.
+    fn draw(&mut self, actor: &Actor, seen: &Observations, segment: &mut Segment) -> Result<()> {
+        let assessment = actor.network.assess(&actor.parameters, seen);
+        let choices = actor.network.choices();
+        let logits = to_vec(&assessment.logits)?;
+        let first = segment.choice.len();
+        for (slot, row) in self.slots.iter_mut().zip(logits.chunks(choices)) {
+            segment
+                .choice
+                .push(sample_choice(row, &mut slot.rng) as i64);
+        }
+        segment.logits.extend(logits);
+        segment.value.extend(to_vec(&assessment.value)?);
+        let choice = Tensor::from_slice(&segment.choice[first..]).to_device(actor.device);
+        let transition = actor
+            .network
+            .transition(&actor.parameters, seen, &assessment, &choice);
+        let Some(gaussian) = transition else {
+            segment
+                .latent
+                .extend(std::iter::repeat_n(0.0, self.slots.len()));
+            segment
+                .gaussian
+                .extend(std::iter::repeat_n(0.0, 2 * self.slots.len()));
+            return Ok(());
+        };
+        let (means, deviations) = (to_vec(&gaussian.mean)?, to_vec(&gaussian.log_deviation)?);
+        for (slot, (mean, deviation)) in self.slots.iter_mut().zip(means.iter().zip(&deviations)) {
+            segment
+                .latent
+                .push(sample_latent(*mean, *deviation, &mut slot.rng));
+            segment.gaussian.extend([mean, deviation]);
+        }
+        Ok(())
+    }
+}
+
+/// Observations at which sequences were cut off, whose values are asked for in one batch.
+#[derive(Default)]
+struct Ends {
+    features: Vec<f32>,
+    valid: Vec<bool>,
+    /// (slot, index of its decision).
+    places: Vec<(usize, usize)>,
+}
+
+impl Ends {
+    fn note(&mut self, slot: &Slot, shape: ObservationShape, place: (usize, usize)) -> Result<()> {
+        let (numbers, tokens) = (self.features.len(), self.valid.len());
+        self.features.resize(numbers + shape.len(), 0.0);
+        self.valid.resize(tokens + shape.tokens, false);
+        slot.environment
+            .observe(&mut self.features[numbers..], &mut self.valid[tokens..])?;
+        self.places.push(place);
+        Ok(())
+    }
+
+    fn evaluate(
+        &self,
+        actor: &Actor,
+        shape: ObservationShape,
+        decisions: &mut [Vec<gae::Decision>],
+    ) -> Result<()> {
+        if self.places.is_empty() {
+            return Ok(());
+        }
+        let seen = observations(&self.features, &self.valid, shape, actor.device);
+        let assessment = actor.network.assess(&actor.parameters, &seen);
+        for (value, &(slot, index)) in to_vec(&assessment.value)?.iter().zip(&self.places) {
+            decisions[slot][index].next = Next::Cut {
+                value: f64::from(*value),
+            };
+        }
+        Ok(())
+    }
+}
+
+/// Tensors of a batch of observations given as rows.
+pub fn observations(
+    features: &[f32],
+    valid: &[bool],
+    shape: ObservationShape,
+    device: Device,
+) -> Observations {
+    let (tokens, width) = (shape.tokens as i64, shape.features as i64);
+    let features = Tensor::from_slice(features).view([-1, tokens, width]);
+    // Skipping the mask where nothing is padded changes no number and saves time.
+    let valid = (!valid.iter().all(|&valid| valid)).then(|| {
+        Tensor::from_slice(valid)
+            .view([-1, tokens])
+            .to_device(device)
+    });
+    Observations {
+        features: features.to_device(device),
+        valid,
+    }
+}
+
+/// The numbers of a tensor in row order.
+pub fn to_vec(tensor: &Tensor) -> Result<Vec<f32>> {
+    Ok(Vec::<f32>::try_from(tensor.detach().reshape(-1))?)
+}

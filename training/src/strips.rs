@@ -1,0 +1,141 @@
+//! Strip imaging as the trainer's environment: the `sim` crate behind [`Environment`].
+
+use std::sync::Arc;
+
+use swath_sim::env::{Env, EpisodeConfig};
+use swath_sim::model::Model;
+use swath_sim::observation::ObservationSet;
+use swath_sim::planner::{Decision, Heuristic, Planner};
+
+use crate::config::StripsConfig;
+use crate::environment::{Action, Environment, ObservationShape, Outcome, Progress};
+use crate::error::{Result, TrainingError};
+
+/// How long to wait when no strip is left to choose from [s].
+const WAIT_S: f64 = 60.0;
+
+/// Strip imaging, one task a step.
+pub struct Strips {
+    model: Arc<Model>,
+    episode: EpisodeConfig,
+    set: ObservationSet,
+    env: Option<Env>,
+    teacher: Heuristic,
+}
+
+impl Strips {
+    /// Strip imaging as a run configures it; the teacher waits 90 s before every strip.
+    ///
+    /// # Errors
+    /// A setting of the simulation that is out of range.
+    pub fn new(config: &StripsConfig) -> Result<Strips> {
+        let model = Model::new(config.simulation.clone()).map_err(failed)?;
+        Ok(Strips {
+            model: Arc::new(model),
+            episode: config.episode.clone(),
+            set: config.observation,
+            env: None,
+            teacher: Heuristic { t_pre_s: 90.0 },
+        })
+    }
+
+    /// The same with a teacher of another fixed transition time [s].
+    pub fn with_teacher(mut self, t_pre_s: f64) -> Strips {
+        self.teacher = Heuristic { t_pre_s };
+        self
+    }
+
+    fn env(&self) -> Result<&Env> {
+        self.env.as_ref().ok_or_else(no_episode)
+    }
+
+    /// Waits until there is a strip to choose; returns the time that took [s].
+    fn wait_for_candidates(&mut self) -> Result<f64> {
+        let ticks = self.model.period.ticks_ceil(WAIT_S).max(1);
+        let env = self.env.as_mut().ok_or_else(no_episode)?;
+        let mut waited = 0;
+        while env.context().candidates.is_empty() {
+            if env.truncated() {
+                return Err(failed("an episode has no strip left to choose from"));
+            }
+            env.step(Decision::Wait { ticks }).map_err(failed)?;
+            waited += ticks;
+        }
+        Ok(self.model.period.duration_s(waited))
+    }
+}
+
+impl Environment for Strips {
+    fn shape(&self) -> ObservationShape {
+        ObservationShape {
+            tokens: self.model.config.planning.candidates,
+            features: self.set.features(),
+        }
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<()> {
+        self.env = Some(Env::episode(self.model.clone(), &self.episode, seed));
+        self.wait_for_candidates()?;
+        Ok(())
+    }
+
+    fn observe(&self, features: &mut [f32], valid: &mut [bool]) -> Result<()> {
+        self.env()?.observe(self.set, features, valid);
+        Ok(())
+    }
+
+    fn step(&mut self, action: Action) -> Result<Outcome> {
+        let decision = decision(&self.model, action);
+        let env = self.env.as_mut().ok_or_else(no_episode)?;
+        let step = env.step(decision).map_err(failed)?;
+        let waited_s = self.wait_for_candidates()?;
+        Ok(Outcome {
+            reward: step.record.reward,
+            duration_s: self.model.period.duration_s(step.record.ticks()) + waited_s,
+            success: step.record.success(),
+            progress: if step.truncated {
+                Progress::Truncated
+            } else {
+                Progress::Continues
+            },
+        })
+    }
+
+    fn reporting_period_s(&self) -> f64 {
+        let orbit = swath_sim::env::horizon(&self.model, 1.0);
+        self.model.period.time_s(orbit)
+    }
+
+    fn parameter_scale_s(&self) -> f64 {
+        self.model.config.planning.t_pre_max_s
+    }
+
+    fn teach(&mut self) -> Result<Option<Action>> {
+        let env = self.env.as_ref().ok_or_else(no_episode)?;
+        let longest_s = self.model.config.planning.t_pre_max_s;
+        Ok(match self.teacher.decide(&env.context()).map_err(failed)? {
+            Decision::Wait { .. } => None,
+            Decision::Image { candidate, t_pre } => Some(Action {
+                token: candidate,
+                parameter: self.model.period.duration_s(t_pre) / longest_s,
+            }),
+        })
+    }
+}
+
+/// The decision that a policy's action stands for: T_pre is rounded up to whole ticks.
+pub fn decision(model: &Model, action: Action) -> Decision {
+    let t_pre_s = action.parameter * model.config.planning.t_pre_max_s;
+    Decision::Image {
+        candidate: action.token,
+        t_pre: model.period.ticks_ceil(t_pre_s).min(model.t_pre_max()),
+    }
+}
+
+fn failed(error: impl ToString) -> TrainingError {
+    TrainingError::Environment(error.to_string())
+}
+
+fn no_episode() -> TrainingError {
+    failed("no episode has begun")
+}
