@@ -48,7 +48,7 @@ fn checkpoint_every() -> u64 {
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum EnvironmentConfig {
     /// Strip imaging: the `sim` crate.
-    Strips(StripsConfig),
+    Strips(Box<StripsConfig>),
     /// A tiny problem with a known optimum.
     Toy(ToyConfig),
 }

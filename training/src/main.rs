@@ -19,12 +19,18 @@ struct Cli {
 enum Command {
     /// Train a planner, or go on with a run
     Train(command::train::TrainArgs),
+    /// Fly the same missions with several planners and compare them
+    Evaluate(command::evaluate::EvaluateArgs),
+    /// Fly the heuristic with fixed transition times of 10 to 120 s
+    Sweep(command::evaluate::SweepArgs),
 }
 
 fn main() -> ExitCode {
     process::prepare();
     let outcome = match Cli::parse().command {
         Command::Train(args) => command::train::train(&args),
+        Command::Evaluate(args) => command::evaluate::evaluate(&args),
+        Command::Sweep(args) => command::evaluate::sweep(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

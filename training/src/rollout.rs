@@ -281,7 +281,7 @@ impl Group {
     fn draw(&mut self, actor: &Actor, seen: &Observations, segment: &mut Segment) -> Result<()> {
         let assessment = actor.network.assess(&actor.parameters, seen);
         let choices = actor.network.choices();
-        let logits = to_vec(&assessment.logits)?;
+        let logits = finite(to_vec(&assessment.logits)?, "choice")?;
         let first = segment.choice.len();
         for (slot, row) in self.slots.iter_mut().zip(logits.chunks(choices)) {
             segment
@@ -289,7 +289,9 @@ impl Group {
                 .push(sample_choice(row, &mut slot.rng) as i64);
         }
         segment.logits.extend(logits);
-        segment.value.extend(to_vec(&assessment.value)?);
+        segment
+            .value
+            .extend(finite(to_vec(&assessment.value)?, "value")?);
         let choice = Tensor::from_slice(&segment.choice[first..]).to_device(actor.device);
         let transition = actor
             .network
@@ -303,7 +305,8 @@ impl Group {
                 .extend(std::iter::repeat_n(0.0, 2 * self.slots.len()));
             return Ok(());
         };
-        let (means, deviations) = (to_vec(&gaussian.mean)?, to_vec(&gaussian.log_deviation)?);
+        let means = finite(to_vec(&gaussian.mean)?, "transition")?;
+        let deviations = finite(to_vec(&gaussian.log_deviation)?, "transition")?;
         for (slot, (mean, deviation)) in self.slots.iter_mut().zip(means.iter().zip(&deviations)) {
             segment
                 .latent
@@ -373,6 +376,14 @@ pub fn observations(
         features: features.to_device(device),
         valid,
     }
+}
+
+/// The same numbers if all are finite.
+pub(crate) fn finite(numbers: Vec<f32>, quantity: &'static str) -> Result<Vec<f32>> {
+    if numbers.iter().all(|number| number.is_finite()) {
+        return Ok(numbers);
+    }
+    Err(TrainingError::PolicyNotFinite { quantity })
 }
 
 /// The numbers of a tensor in row order.

@@ -12,7 +12,7 @@ use crate::environment::{Action, Environment, ObservationShape, Outcome, Progres
 use crate::error::{Result, TrainingError};
 
 /// How long to wait when no strip is left to choose from [s].
-const WAIT_S: f64 = 60.0;
+pub(crate) const WAIT_S: f64 = 60.0;
 
 /// Strip imaging, one task a step.
 pub struct Strips {

@@ -13,11 +13,11 @@ const LONGEST_S: f64 = 100.0;
 /// Seconds that imaging itself takes.
 const IMAGING_S: f64 = 20.0;
 
-/// Each token has a worth and a need; choosing it with a parameter of at least the need succeeds
-/// and pays the worth. The step lasts 20 s plus 100 s times the parameter, so the best action is
-/// the best ratio of worth to duration with the parameter barely above the need.
+/// Each token has a worth and a need. Choosing it pays worth × (1 − 4·(parameter − need)²), at
+/// least 0, and lasts 20 s plus 100 s times the need.
 ///
-/// Fresh tokens are drawn every step, so what an action pays now is all it changes besides time.
+/// Fresh tokens are drawn every step, so what an action changes besides its reward is time alone:
+/// the best action's parameter is the need, and its token is worth most, less what its time costs.
 pub struct Toy {
     tokens: usize,
     rng: ChaCha8Rng,
@@ -86,7 +86,7 @@ impl Toy {
         }
     }
 
-    /// Worth of a token, and the shortest duration that earns it [s].
+    /// Worth of a token and the duration of choosing it [s].
     fn prospect(&self, token: usize) -> (f64, f64) {
         let need = f64::from(self.need[token]);
         (f64::from(self.worth[token]), IMAGING_S + LONGEST_S * need)
@@ -119,19 +119,20 @@ impl Environment for Toy {
     }
 
     fn step(&mut self, action: Action) -> Result<Outcome> {
-        let success =
-            action.token < self.valid && action.parameter >= f64::from(self.need[action.token]);
-        let reward = if success {
-            f64::from(self.worth[action.token])
+        let token = action.token.min(self.tokens - 1);
+        let (worth, duration_s) = self.prospect(token);
+        let error = action.parameter - f64::from(self.need[token]);
+        let share = if token < self.valid {
+            (1.0 - 4.0 * error * error).max(0.0)
         } else {
             0.0
         };
         self.step += 1;
         self.draw();
         Ok(Outcome {
-            reward,
-            duration_s: IMAGING_S + LONGEST_S * action.parameter,
-            success,
+            reward: worth * share,
+            duration_s,
+            success: share > 0.9,
             progress: if self.step == STEPS {
                 Progress::Truncated
             } else {
@@ -157,7 +158,7 @@ impl Environment for Toy {
         let token = (0..self.valid).max_by(|&a, &b| rate(a).total_cmp(&rate(b)));
         Ok(token.map(|token| Action {
             token,
-            parameter: (f64::from(self.need[token]) + 0.05).min(1.0),
+            parameter: f64::from(self.need[token]),
         }))
     }
 }

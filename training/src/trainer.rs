@@ -10,7 +10,7 @@ use tch::Device;
 use crate::checkpoint;
 use crate::config::{EnvironmentConfig, RunConfig};
 use crate::environment::Environment;
-use crate::error::Result;
+use crate::error::{Result, TrainingError};
 use crate::network::Network;
 use crate::parameters::{Layout, Parameters};
 use crate::ppo::{Ppo, UpdateStatistics};
@@ -273,7 +273,14 @@ impl Trainer {
             .par_iter_mut()
             .zip(actors)
             .map(|(group, actor)| group.collect(&actor, steps, discount))
-            .collect()
+            .collect::<Result<_>>()
+            .map_err(|error| match error {
+                TrainingError::PolicyNotFinite { quantity } => TrainingError::NotFinite {
+                    quantity,
+                    step: self.steps,
+                },
+                error => error,
+            })
     }
 
     /// Reward per orbit, success and mean transition of segments.

@@ -1,3 +1,8 @@
 //! The commands of `swath-train`.
 
+pub mod evaluate;
 pub mod train;
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}

@@ -39,7 +39,7 @@ pub struct TrainArgs {
     #[arg(long, default_value = "cpu")]
     device: String,
     /// Threads; results do not depend on it
-    #[arg(long, default_value_t = cores())]
+    #[arg(long, default_value_t = super::cores())]
     threads: usize,
     /// Go on from the newest checkpoint of the run's folder, or from a given one
     #[arg(long, value_name = "CHECKPOINT", num_args = 0..=1)]
@@ -47,10 +47,6 @@ pub struct TrainArgs {
     /// Save and leave after this many environment steps, as Ctrl-C would
     #[arg(long, value_name = "STEPS")]
     stop_after: Option<u64>,
-}
-
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Runs the command.

@@ -127,7 +127,7 @@ fn positions(tokens: usize, dim: usize) -> Vec<f32> {
     let value = |token: usize, index: usize| {
         let rate = 10000f64.powf(-((index / 2 * 2) as f64) / dim as f64);
         let angle = token as f64 * rate;
-        let value = if index % 2 == 0 {
+        let value = if index.is_multiple_of(2) {
             angle.sin()
         } else {
             angle.cos()

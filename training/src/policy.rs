@@ -1,0 +1,237 @@
+//! Trained policies as the planner node and the evaluation fly them: one observation, one decision.
+
+use std::path::Path;
+
+use swath_sim::observation::{ObservationSet, observe};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
+use tch::{Device, Tensor};
+
+use crate::checkpoint;
+use crate::config::{EnvironmentConfig, RunConfig};
+use crate::distribution::{best_choice, squash};
+use crate::environment::{Action, ObservationShape};
+use crate::error::{Result, TrainingError};
+use crate::network::Network;
+use crate::parameters::Parameters;
+use crate::rollout::{finite, observations, to_vec};
+use crate::store::Content;
+use crate::strips::decision;
+
+/// Largest file that is read as a policy [bytes]; the paper's own sizes fit.
+const LARGEST_FILE: u64 = 1 << 30;
+
+/// A trained policy, read from a checkpoint or policy file.
+#[derive(Debug)]
+pub struct Policy {
+    network: Network,
+    parameters: Parameters,
+    set: ObservationSet,
+    run: RunConfig,
+    steps: u64,
+    digest: String,
+    longest_s: f64,
+}
+
+/// What a policy says about one observation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// Probability of each token, in the order of the candidates; 0 for padding.
+    pub probabilities: Vec<f32>,
+    /// The critic's value.
+    pub value: f32,
+    /// The most probable action.
+    pub action: Action,
+}
+
+impl Policy {
+    /// Reads a policy. libtorch runs on one thread afterwards, so that the same observation always
+    /// gives the same action.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged, or was trained on another problem than strips.
+    pub fn load(path: &Path) -> Result<Policy> {
+        let size = std::fs::metadata(path)
+            .map_err(TrainingError::file("read", path))?
+            .len();
+        if size > LARGEST_FILE {
+            let reason = format!("it has {size} bytes, a policy has at most {LARGEST_FILE}");
+            return Err(TrainingError::damaged(path, reason));
+        }
+        let content = Content::read(path)?;
+        let header = checkpoint::header(&content, path)?;
+        let EnvironmentConfig::Strips(strips) = &header.run.environment else {
+            return Err(TrainingError::damaged(path, "it was not trained on strips"));
+        };
+        let shape = ObservationShape {
+            tokens: strips.simulation.planning.candidates,
+            features: strips.observation.features(),
+        };
+        let longest_s = strips.simulation.planning.t_pre_max_s;
+        let (network, layout) = Network::new(&header.run.network, shape, longest_s)?;
+        let weights = checkpoint::flat_weights(&content, &layout, path)?;
+        tch::set_num_threads(1);
+        Ok(Policy {
+            parameters: Parameters::from_flat(&layout, Tensor::from_slice(&weights))?,
+            network,
+            set: strips.observation,
+            steps: header.steps,
+            digest: content.digest(),
+            longest_s,
+            run: header.run,
+        })
+    }
+
+    /// SHA-256 of header and weights, in hexadecimal.
+    pub fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// The run that trained it.
+    pub fn run(&self) -> &RunConfig {
+        &self.run
+    }
+
+    /// Environment steps that it was trained for.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Features it wants of each strip.
+    pub fn observation_set(&self) -> ObservationSet {
+        self.set
+    }
+
+    /// Size of the observations it takes.
+    pub fn shape(&self) -> ObservationShape {
+        self.network.shape()
+    }
+
+    /// Longest transition it was trained with [s].
+    pub fn longest_transition_s(&self) -> f64 {
+        self.longest_s
+    }
+
+    /// Judges one observation: `features` is tokens × features in row order, `valid` false for padding.
+    ///
+    /// # Errors
+    /// An observation of another shape or without a valid token, and outputs that are not finite.
+    pub fn judge(&self, features: &[f32], valid: &[bool]) -> Result<Judgement> {
+        let shape = self.network.shape();
+        if features.len() != shape.len() || valid.len() != shape.tokens || !valid.contains(&true) {
+            let found = format!("{} numbers for {} tokens", features.len(), valid.len());
+            let wanted = format!("{} × {} numbers, one valid", shape.tokens, shape.features);
+            return Err(TrainingError::Shape { wanted, found });
+        }
+        let _guard = tch::no_grad_guard();
+        let seen = observations(features, valid, shape, Device::Cpu);
+        let assessment = self.network.assess(&self.parameters, &seen);
+        let logits = finite(to_vec(&assessment.logits)?, "choice")?;
+        let value = finite(to_vec(&assessment.value)?, "value")?[0];
+        let choice = best_choice(&logits);
+        let (token, fixed) = self.network.decode(choice);
+        let index = Tensor::from_slice(&[choice as i64]);
+        let transition = self
+            .network
+            .transition(&self.parameters, &seen, &assessment, &index);
+        let parameter = match (fixed, transition) {
+            (Some(parameter), _) => parameter,
+            (None, Some(gaussian)) => squash(finite(to_vec(&gaussian.mean)?, "transition")?[0]),
+            (None, None) => 0.0,
+        };
+        Ok(Judgement {
+            probabilities: self.token_probabilities(&logits),
+            value,
+            action: Action { token, parameter },
+        })
+    }
+
+    /// Softmax of the logits, summed over the choices of each token.
+    fn token_probabilities(&self, logits: &[f32]) -> Vec<f32> {
+        let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let weights: Vec<f64> = logits
+            .iter()
+            .map(|&logit| f64::from(logit - largest).exp())
+            .collect();
+        let total: f64 = weights.iter().sum();
+        let mut probabilities = vec![0.0f64; self.network.shape().tokens];
+        for (choice, weight) in weights.iter().enumerate() {
+            probabilities[self.network.decode(choice).0] += weight / total;
+        }
+        probabilities.into_iter().map(|p| p as f32).collect()
+    }
+}
+
+/// A policy as a [`Planner`]: the most probable strip, and the mean of its transition.
+#[derive(Debug)]
+pub struct LearnedPlanner {
+    policy: Policy,
+    features: Vec<f32>,
+    valid: Vec<bool>,
+    judgement: Option<Judgement>,
+}
+
+impl LearnedPlanner {
+    /// A planner that follows a policy.
+    pub fn new(policy: Policy) -> LearnedPlanner {
+        let shape = policy.shape();
+        LearnedPlanner {
+            policy,
+            features: vec![0.0; shape.len()],
+            valid: vec![false; shape.tokens],
+            judgement: None,
+        }
+    }
+
+    /// The policy.
+    pub fn policy(&self) -> &Policy {
+        &self.policy
+    }
+
+    /// What the policy said at the last decision; none before the first and after a wait.
+    pub fn judgement(&self) -> Option<&Judgement> {
+        self.judgement.as_ref()
+    }
+}
+
+impl Planner for LearnedPlanner {
+    fn name(&self) -> String {
+        self.policy.run.network.kind().to_owned()
+    }
+
+    fn decide(
+        &mut self,
+        context: &DecisionContext<'_>,
+    ) -> std::result::Result<Decision, PlannerError> {
+        self.judgement = None;
+        let failed = |error: TrainingError| PlannerError::Policy(error.to_string());
+        let (count, slots) = (context.candidates.len(), self.valid.len());
+        let longest_s = context.model.config.planning.t_pre_max_s;
+        if count > slots || longest_s != self.policy.longest_s {
+            return Err(failed(TrainingError::Shape {
+                wanted: format!("at most {slots} candidates and {} s", self.policy.longest_s),
+                found: format!("{count} candidates and {longest_s} s"),
+            }));
+        }
+        if count == 0 {
+            let ticks = context
+                .model
+                .period
+                .ticks_ceil(crate::strips::WAIT_S)
+                .max(1);
+            return Ok(Decision::Wait { ticks });
+        }
+        observe(
+            context,
+            self.policy.set,
+            &mut self.features,
+            &mut self.valid,
+        );
+        let judgement = self
+            .policy
+            .judge(&self.features, &self.valid)
+            .map_err(failed)?;
+        let action = judgement.action;
+        self.judgement = Some(judgement);
+        Ok(decision(context.model, action))
+    }
+}
