@@ -59,11 +59,7 @@ mod tests {
         let mut adam = Adam::new(1, Device::Cpu);
         let (mut x, mut m, mut v) = (1.0f64, 0.0f64, 0.0f64);
         for (step, gradient) in [0.5f64, -0.25, 2.0].into_iter().enumerate() {
-            adam.step(
-                &mut parameters,
-                &Tensor::from_slice(&[gradient as f32]),
-                0.1,
-            );
+            adam.step(&mut parameters, &Tensor::from_slice(&[gradient as f32]), 0.1);
             let t = step as i32 + 1;
             m = 0.9 * m + 0.1 * gradient;
             v = 0.999 * v + 0.001 * gradient * gradient;

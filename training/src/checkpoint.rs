@@ -79,10 +79,7 @@ pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerStat
     let content = Content::read(path)?;
     let header = header(&content, path)?;
     if header.content != "checkpoint" {
-        return Err(TrainingError::damaged(
-            path,
-            format!("it is a {}", header.content),
-        ));
+        return Err(TrainingError::damaged(path, format!("it is a {}", header.content)));
     }
     check_same_run(&header.run, run, path)?;
     let state = TrainerState {
@@ -98,11 +95,7 @@ pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerStat
     let sizes = [
         ("adam.first", state.first.len(), layout.count()),
         ("adam.second", state.second.len(), layout.count()),
-        (
-            "environments.rng",
-            state.slots.len(),
-            run.rollout.environments,
-        ),
+        ("environments.rng", state.slots.len(), run.rollout.environments),
     ];
     for (name, found, wanted) in sizes {
         if found != wanted {
@@ -115,8 +108,7 @@ pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerStat
 
 /// The header of a checkpoint or policy.
 pub fn header(content: &Content, path: &Path) -> Result<Header> {
-    let header: Header = serde_json::from_str(&content.header)
-        .map_err(|error| TrainingError::damaged(path, error))?;
+    let header: Header = serde_json::from_str(&content.header).map_err(|error| TrainingError::damaged(path, error))?;
     if header.version != VERSION {
         let reason = format!("its version is {}, not {VERSION}", header.version);
         return Err(TrainingError::damaged(path, reason));
@@ -144,9 +136,7 @@ pub fn flat_weights(content: &Content, layout: &Layout, path: &Path) -> Result<V
 /// # Errors
 /// When there is none.
 pub fn newest(folder: &Path) -> Result<PathBuf> {
-    let none = || TrainingError::NoCheckpoint {
-        path: folder.to_path_buf(),
-    };
+    let none = || TrainingError::NoCheckpoint { path: folder.to_path_buf() };
     list(folder)?.pop().ok_or_else(none)
 }
 
@@ -183,10 +173,7 @@ fn weights(trainer: &Trainer, state: &TrainerState, content: &str) -> Result<Con
         adam_steps: state.adam_steps,
         kl_coefficient_bits: state.kl_coefficient.to_bits(),
     };
-    let mut content = Content {
-        header: store::json(&header)?,
-        tensors: BTreeMap::new(),
-    };
+    let mut content = Content { header: store::json(&header)?, tensors: BTreeMap::new() };
     let mut offset = 0;
     for (name, shape) in trainer.layout().entries() {
         let shape: Vec<usize> = shape.iter().map(|&size| size as usize).collect();
@@ -211,13 +198,8 @@ fn slots(content: &Content, path: &Path) -> Result<Vec<SlotState>> {
         let reason = "its environments' tensors do not fit each other";
         return Err(TrainingError::damaged(path, reason));
     }
-    let mut actions = tokens
-        .iter()
-        .zip(&parameters)
-        .map(|(&token, &parameter)| Action {
-            token: token as usize,
-            parameter,
-        });
+    let mut actions =
+        tokens.iter().zip(&parameters).map(|(&token, &parameter)| Action { token: token as usize, parameter });
     let mut slots = Vec::with_capacity(seeds.len());
     for ((rng, seed), length) in rngs.chunks(RNG_BYTES).zip(seeds).zip(lengths) {
         slots.push(SlotState {
@@ -242,10 +224,7 @@ fn rng_from(bytes: &[u8], path: &Path) -> Result<ChaCha8Rng> {
     let stream = part(32, 40).and_then(|it| <[u8; 8]>::try_from(it).ok());
     let position = part(40, RNG_BYTES).and_then(|it| <[u8; 16]>::try_from(it).ok());
     let (Some(seed), Some(stream), Some(position)) = (seed, stream, position) else {
-        return Err(TrainingError::damaged(
-            path,
-            "a generator's state is cut short",
-        ));
+        return Err(TrainingError::damaged(path, "a generator's state is cut short"));
     };
     let mut rng = ChaCha8Rng::from_seed(seed);
     rng.set_stream(u64::from_le_bytes(stream));
@@ -265,9 +244,7 @@ fn check_same_run(found: &RunConfig, wanted: &RunConfig, path: &Path) -> Result<
     if found.get(key) == wanted.get(key) {
         return Ok(());
     }
-    let shown = |entries: &BTreeMap<String, String>| {
-        entries.get(key).cloned().unwrap_or_else(|| "absent".into())
-    };
+    let shown = |entries: &BTreeMap<String, String>| entries.get(key).cloned().unwrap_or_else(|| "absent".into());
     Err(TrainingError::Mismatch {
         path: path.to_path_buf(),
         key: key.clone(),
@@ -278,8 +255,7 @@ fn check_same_run(found: &RunConfig, wanted: &RunConfig, path: &Path) -> Result<
 
 /// Dotted keys and values of a run, less what may differ.
 fn settings(run: &RunConfig) -> Result<BTreeMap<String, String>> {
-    let value =
-        serde_json::to_value(run).map_err(|error| TrainingError::Environment(error.to_string()))?;
+    let value = serde_json::to_value(run).map_err(|error| TrainingError::Environment(error.to_string()))?;
     let mut entries = BTreeMap::new();
     flatten("", &value, &mut entries);
     entries.retain(|key, _| !MAY_DIFFER.contains(&key.as_str()));

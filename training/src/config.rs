@@ -85,10 +85,7 @@ pub struct RolloutConfig {
 
 impl Default for RolloutConfig {
     fn default() -> RolloutConfig {
-        RolloutConfig {
-            environments: 64,
-            group: 32,
-        }
+        RolloutConfig { environments: 64, group: 32 }
     }
 }
 
@@ -188,10 +185,8 @@ impl RunConfig {
     /// An unreadable file, an unknown key, or a value out of range.
     pub fn load(path: &Path) -> Result<RunConfig> {
         let text = std::fs::read_to_string(path).map_err(TrainingError::file("read", path))?;
-        let run: RunConfig = toml::from_str(&text).map_err(|source| TrainingError::Toml {
-            path: path.to_path_buf(),
-            source: Box::new(source),
-        })?;
+        let run: RunConfig = toml::from_str(&text)
+            .map_err(|source| TrainingError::Toml { path: path.to_path_buf(), source: Box::new(source) })?;
         run.validate()?;
         Ok(run)
     }
@@ -201,35 +196,16 @@ impl RunConfig {
     pub fn validate(&self) -> Result<()> {
         let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         if self.name.is_empty() || self.name.starts_with('.') || !self.name.chars().all(plain) {
-            return Err(setting(
-                "name",
-                &self.name,
-                "letters, digits, '-', '_' and '.'",
-            ));
+            return Err(setting("name", &self.name, "letters, digits, '-', '_' and '.'"));
         }
         between("steps", self.steps as f64, 1.0, 1e12)?;
         between("checkpoint_every", self.checkpoint_every as f64, 1.0, 1e12)?;
         self.rollout.validate()?;
         self.ppo.validate()?;
         if let Some(warm_start) = &self.warm_start {
-            between(
-                "warm_start.decisions",
-                warm_start.decisions as f64,
-                1.0,
-                1e9,
-            )?;
-            between(
-                "warm_start.learning_rate",
-                warm_start.learning_rate,
-                1e-9,
-                1.0,
-            )?;
-            between(
-                "warm_start.teacher_t_pre_s",
-                warm_start.teacher_t_pre_s,
-                0.0,
-                1e4,
-            )?;
+            between("warm_start.decisions", warm_start.decisions as f64, 1.0, 1e9)?;
+            between("warm_start.learning_rate", warm_start.learning_rate, 1e-9, 1.0)?;
+            between("warm_start.teacher_t_pre_s", warm_start.teacher_t_pre_s, 0.0, 1e4)?;
         }
         self.environment.validate()
     }
@@ -243,9 +219,7 @@ impl RunConfig {
 impl EnvironmentConfig {
     fn validate(&self) -> Result<()> {
         match self {
-            EnvironmentConfig::Toy(toy) => {
-                between("environment.tokens", toy.tokens as f64, 2.0, 1000.0)
-            }
+            EnvironmentConfig::Toy(toy) => between("environment.tokens", toy.tokens as f64, 2.0, 1000.0),
             EnvironmentConfig::Strips(strips) => {
                 let sim = |error: swath_sim::error::SimError| TrainingError::Setting {
                     key: "environment".into(),
@@ -261,18 +235,8 @@ impl EnvironmentConfig {
 
 impl RolloutConfig {
     fn validate(&self) -> Result<()> {
-        between(
-            "rollout.environments",
-            self.environments as f64,
-            1.0,
-            65536.0,
-        )?;
-        between(
-            "rollout.group",
-            self.group as f64,
-            1.0,
-            self.environments as f64,
-        )?;
+        between("rollout.environments", self.environments as f64, 1.0, 65536.0)?;
+        between("rollout.group", self.group as f64, 1.0, self.environments as f64)?;
         if !self.environments.is_multiple_of(self.group) {
             let limit = format!("a divisor of rollout.environments, {}", self.environments);
             return Err(setting("rollout.group", self.group, &limit));
@@ -285,12 +249,7 @@ impl PpoConfig {
     fn validate(&self) -> Result<()> {
         for (key, value, least, most) in [
             ("ppo.batch", self.batch as f64, 2.0, 1e7),
-            (
-                "ppo.minibatch",
-                self.minibatch as f64,
-                1.0,
-                self.batch as f64,
-            ),
+            ("ppo.minibatch", self.minibatch as f64, 1.0, self.batch as f64),
             ("ppo.epochs", self.epochs as f64, 1.0, 1000.0),
             ("ppo.learning_rate", self.learning_rate, 1e-12, 1.0),
             ("ppo.learning_rate_end", self.learning_rate_end, 0.0, 1.0),
@@ -299,24 +258,9 @@ impl PpoConfig {
             ("ppo.clip", self.clip, 1e-6, 10.0),
             ("ppo.gradient_norm", self.gradient_norm, 1e-6, 1e6),
             ("ppo.value_coefficient", self.value_coefficient, 0.0, 1e6),
-            (
-                "ppo.value_clamp",
-                self.value_clamp.unwrap_or(1.0),
-                1e-6,
-                1e9,
-            ),
-            (
-                "ppo.entropy_coefficient",
-                self.entropy_coefficient,
-                0.0,
-                100.0,
-            ),
-            (
-                "ppo.transition_entropy_coefficient",
-                self.transition_entropy_coefficient,
-                0.0,
-                100.0,
-            ),
+            ("ppo.value_clamp", self.value_clamp.unwrap_or(1.0), 1e-6, 1e9),
+            ("ppo.entropy_coefficient", self.entropy_coefficient, 0.0, 100.0),
+            ("ppo.transition_entropy_coefficient", self.transition_entropy_coefficient, 0.0, 100.0),
             ("ppo.kl_stop", self.kl_stop.unwrap_or(1.0), 1e-9, 1e3),
             ("ppo.shards", self.shards as f64, 1.0, self.minibatch as f64),
         ] {
@@ -338,9 +282,5 @@ fn between(key: &str, value: f64, least: f64, most: f64) -> Result<()> {
 }
 
 fn setting(key: &str, value: impl ToString, limit: &str) -> TrainingError {
-    TrainingError::Setting {
-        key: key.to_owned(),
-        value: value.to_string(),
-        limit: limit.to_owned(),
-    }
+    TrainingError::Setting { key: key.to_owned(), value: value.to_string(), limit: limit.to_owned() }
 }

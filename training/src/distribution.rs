@@ -20,9 +20,7 @@ pub fn log_probabilities(logits: &Tensor) -> Tensor {
 
 /// Log-probability of the chosen entries, [batch].
 pub fn chosen(log_probabilities: &Tensor, choice: &Tensor) -> Tensor {
-    log_probabilities
-        .gather(-1, &choice.unsqueeze(-1), false)
-        .squeeze_dim(-1)
+    log_probabilities.gather(-1, &choice.unsqueeze(-1), false).squeeze_dim(-1)
 }
 
 /// Entropy of the categorical, [batch].
@@ -49,9 +47,7 @@ impl SquashedGaussian {
     pub fn from_outputs(outputs: &Tensor) -> SquashedGaussian {
         SquashedGaussian {
             mean: outputs.select(-1, 0),
-            log_deviation: outputs
-                .select(-1, 1)
-                .clamp(LOG_DEVIATION.0, LOG_DEVIATION.1),
+            log_deviation: outputs.select(-1, 1).clamp(LOG_DEVIATION.0, LOG_DEVIATION.1),
         }
     }
 
@@ -135,10 +131,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn gaussian(mean: f32, log_deviation: f32) -> SquashedGaussian {
-        SquashedGaussian {
-            mean: Tensor::from_slice(&[mean]),
-            log_deviation: Tensor::from_slice(&[log_deviation]),
-        }
+        SquashedGaussian { mean: Tensor::from_slice(&[mean]), log_deviation: Tensor::from_slice(&[log_deviation]) }
     }
 
     #[test]
@@ -153,10 +146,7 @@ mod tests {
             assert_abs_diff_eq!(found, (weight / total).ln(), epsilon = 1e-6);
         }
         assert_eq!(logs.exp().double_value(&[0, 3]), 0.0);
-        let wanted: f64 = weights
-            .iter()
-            .map(|w| -(w / total) * (w / total).ln())
-            .sum();
+        let wanted: f64 = weights.iter().map(|w| -(w / total) * (w / total).ln()).sum();
         assert_abs_diff_eq!(entropy(&logs).double_value(&[0]), wanted, epsilon = 1e-6);
     }
 
@@ -178,11 +168,7 @@ mod tests {
         let parameters = (0..count).map(|i| (f64::from(i) + 0.5) / f64::from(count));
         let latents: Vec<f32> = parameters.map(|u| (2.0 * u - 1.0).atanh() as f32).collect();
         let densities = gaussian.log_density(&Tensor::from_slice(&latents)).exp();
-        assert_abs_diff_eq!(
-            densities.mean(Kind::Double).double_value(&[]),
-            1.0,
-            epsilon = 1e-4
-        );
+        assert_abs_diff_eq!(densities.mean(Kind::Double).double_value(&[]), 1.0, epsilon = 1e-4);
     }
 
     #[test]
@@ -191,8 +177,7 @@ mod tests {
         let found = gaussian(mean as f32, deviation.ln() as f32)
             .log_density(&Tensor::from_slice(&[x as f32]))
             .double_value(&[0]);
-        let normal = (-0.5 * ((x - mean) / deviation).powi(2)).exp()
-            / (deviation * std::f64::consts::TAU.sqrt());
+        let normal = (-0.5 * ((x - mean) / deviation).powi(2)).exp() / (deviation * std::f64::consts::TAU.sqrt());
         let slope = 0.5 * (1.0 - x.tanh().powi(2));
         assert_relative_eq!(found, (normal / slope).ln(), epsilon = 1e-5);
         let far = gaussian(0.0, 2.0).log_density(&Tensor::from_slice(&[50.0f32]));
@@ -202,9 +187,7 @@ mod tests {
     #[test]
     fn gaussian_kl_equals_its_closed_form() {
         let (m0, s0, m1, s1) = (0.1f64, 0.5f64, -0.4f64, 0.9f64);
-        let found = gaussian(m0 as f32, s0.ln() as f32)
-            .kl(&gaussian(m1 as f32, s1.ln() as f32))
-            .double_value(&[0]);
+        let found = gaussian(m0 as f32, s0.ln() as f32).kl(&gaussian(m1 as f32, s1.ln() as f32)).double_value(&[0]);
         let wanted = (s1 / s0).ln() + (s0 * s0 + (m0 - m1).powi(2)) / (2.0 * s1 * s1) - 0.5;
         assert_abs_diff_eq!(found, wanted, epsilon = 1e-6);
     }

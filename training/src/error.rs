@@ -96,22 +96,12 @@ pub type Result<T> = std::result::Result<T, TrainingError>;
 
 impl TrainingError {
     /// For `map_err` on an I/O result.
-    pub(crate) fn file(
-        action: &'static str,
-        path: &Path,
-    ) -> impl FnOnce(std::io::Error) -> TrainingError {
+    pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> TrainingError {
         let path = path.to_path_buf();
-        move |source| TrainingError::File {
-            action,
-            path,
-            source,
-        }
+        move |source| TrainingError::File { action, path, source }
     }
 
     pub(crate) fn damaged(path: &Path, reason: impl ToString) -> TrainingError {
-        TrainingError::Damaged {
-            path: path.to_path_buf(),
-            reason: reason.to_string(),
-        }
+        TrainingError::Damaged { path: path.to_path_buf(), reason: reason.to_string() }
     }
 }

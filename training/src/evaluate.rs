@@ -37,16 +37,11 @@ impl FromStr for PlannerSpec {
         match text.split_once(':') {
             None if text == "random" => Ok(PlannerSpec::Random),
             Some(("heuristic", seconds)) => match seconds.parse::<f64>() {
-                Ok(seconds) if (0.0..=600.0).contains(&seconds) => {
-                    Ok(PlannerSpec::Heuristic(seconds))
-                }
+                Ok(seconds) if (0.0..=600.0).contains(&seconds) => Ok(PlannerSpec::Heuristic(seconds)),
                 _ => Err(format!("{seconds} is not a transition time of 0 to 600 s")),
             },
             Some((kind @ ("hop-ppo" | "hop-ppo-mlp" | "h-ppo" | "discrete-ppo"), path)) => {
-                Ok(PlannerSpec::Learned {
-                    kind: kind.into(),
-                    path: path.into(),
-                })
+                Ok(PlannerSpec::Learned { kind: kind.into(), path: path.into() })
             }
             _ => Err(format!(
                 "{text} is none of random, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE, discrete-ppo:FILE"
@@ -169,8 +164,7 @@ fn mission(mut env: Env, planner: &mut dyn Planner, seed: u64, orbits: f64) -> R
     let requests = env.catalogue().len();
     let period = env.model().period;
     let mut totals = Totals::default();
-    env.run(planner, |record| totals.add(record))
-        .map_err(|error| TrainingError::Environment(error.to_string()))?;
+    env.run(planner, |record| totals.add(record)).map_err(|error| TrainingError::Environment(error.to_string()))?;
     let attempts = totals.attempts as f64;
     let seconds = |ticks: u64| ticks as f64 * period.seconds();
     Ok(Mission {
@@ -200,16 +194,8 @@ pub fn spread_of(values: &[f64]) -> Spread {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let deviation = if count > 1.0 {
-        (squares / (count - 1.0)).sqrt()
-    } else {
-        0.0
-    };
-    Spread {
-        mean,
-        deviation,
-        confidence_95: student_975(count - 1.0) * deviation / count.sqrt(),
-    }
+    let deviation = if count > 1.0 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
+    Spread { mean, deviation, confidence_95: student_975(count - 1.0) * deviation / count.sqrt() }
 }
 
 /// The 97.5 % quantile of Student's t, by the expansion of Abramowitz & Stegun 26.7.5.

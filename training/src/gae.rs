@@ -56,12 +56,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn decision(reward: f64, duration_s: f64, value: f64, next: Next) -> Decision {
-        Decision {
-            reward,
-            duration_s,
-            value,
-            next,
-        }
+        Decision { reward, duration_s, value, next }
     }
 
     #[test]
@@ -73,17 +68,13 @@ mod tests {
         ];
         let gamma: f64 = 0.999;
         let found = advantages(&sequence, gamma, 1.0);
-        let returned =
-            gamma.powf(100.0) * (1.0 + gamma.powf(40.0) * (0.5 + gamma.powf(60.0) * (0.25 + 3.0)));
+        let returned = gamma.powf(100.0) * (1.0 + gamma.powf(40.0) * (0.5 + gamma.powf(60.0) * (0.25 + 3.0)));
         assert_relative_eq!(found[0], returned - 0.7, epsilon = 1e-12);
     }
 
     #[test]
     fn with_lambda_zero_it_is_the_one_step_error() {
-        let sequence = [
-            decision(1.0, 10.0, 0.7, Next::Decision),
-            decision(0.5, 20.0, 0.2, Next::Terminated),
-        ];
+        let sequence = [decision(1.0, 10.0, 0.7, Next::Decision), decision(0.5, 20.0, 0.2, Next::Terminated)];
         let found = advantages(&sequence, 0.9, 0.0);
         assert_relative_eq!(found[0], 0.9f64.powf(10.0) * 1.2 - 0.7, epsilon = 1e-12);
         assert_relative_eq!(found[1], 0.9f64.powf(20.0) * 0.5 - 0.2, epsilon = 1e-12);

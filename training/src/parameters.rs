@@ -43,11 +43,7 @@ impl Layout {
     }
 
     fn add(&mut self, name: &str, shape: Vec<i64>, fill: Fill) -> Slot {
-        self.entries.push(Entry {
-            name: name.to_owned(),
-            shape,
-            fill,
-        });
+        self.entries.push(Entry { name: name.to_owned(), shape, fill });
         Slot(self.entries.len() - 1)
     }
 
@@ -79,9 +75,7 @@ impl Parameters {
         let mut parts = Vec::with_capacity(layout.entries.len());
         for entry in &layout.entries {
             parts.push(match entry.fill {
-                Fill::Constant(value) => {
-                    Tensor::f_full(entry.shape.as_slice(), value, (Kind::Float, Device::Cpu))?
-                }
+                Fill::Constant(value) => Tensor::f_full(entry.shape.as_slice(), value, (Kind::Float, Device::Cpu))?,
                 Fill::Orthogonal(gain) => orthogonal(&entry.shape, gain, rng)?,
             });
         }
@@ -105,10 +99,7 @@ impl Parameters {
 
     /// The same values, for use on another thread.
     pub fn share(&self) -> Parameters {
-        Parameters {
-            flat: self.flat.shallow_clone(),
-            leaves: self.leaves.iter().map(Tensor::shallow_clone).collect(),
-        }
+        Parameters { flat: self.flat.shallow_clone(), leaves: self.leaves.iter().map(Tensor::shallow_clone).collect() }
     }
 
     /// The tensor in a slot.
@@ -123,13 +114,11 @@ impl Parameters {
         let pieces: Vec<Tensor> = gradients
             .iter()
             .zip(&self.leaves)
-            .map(|(gradient, leaf)| {
-                if gradient.defined() {
-                    gradient.reshape(-1)
-                } else {
-                    leaf.detach().zeros_like().reshape(-1)
-                }
-            })
+            .map(
+                |(gradient, leaf)| {
+                    if gradient.defined() { gradient.reshape(-1) } else { leaf.detach().zeros_like().reshape(-1) }
+                },
+            )
             .collect();
         Ok(Tensor::f_cat(&pieces, 0)?)
     }

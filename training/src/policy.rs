@@ -50,9 +50,7 @@ impl Policy {
     /// # Errors
     /// A file that cannot be read, is damaged, or was trained on another problem than strips.
     pub fn load(path: &Path) -> Result<Policy> {
-        let size = std::fs::metadata(path)
-            .map_err(TrainingError::file("read", path))?
-            .len();
+        let size = std::fs::metadata(path).map_err(TrainingError::file("read", path))?.len();
         if size > LARGEST_FILE {
             let reason = format!("it has {size} bytes, a policy has at most {LARGEST_FILE}");
             return Err(TrainingError::damaged(path, reason));
@@ -62,10 +60,8 @@ impl Policy {
         let EnvironmentConfig::Strips(strips) = &header.run.environment else {
             return Err(TrainingError::damaged(path, "it was not trained on strips"));
         };
-        let shape = ObservationShape {
-            tokens: strips.simulation.planning.candidates,
-            features: strips.observation.features(),
-        };
+        let shape =
+            ObservationShape { tokens: strips.simulation.planning.candidates, features: strips.observation.features() };
         let longest_s = strips.simulation.planning.t_pre_max_s;
         let (network, layout) = Network::new(&header.run.network, shape, longest_s)?;
         let weights = checkpoint::flat_weights(&content, &layout, path)?;
@@ -130,28 +126,19 @@ impl Policy {
         let choice = best_choice(&logits);
         let (token, fixed) = self.network.decode(choice);
         let index = Tensor::from_slice(&[choice as i64]);
-        let transition = self
-            .network
-            .transition(&self.parameters, &seen, &assessment, &index);
+        let transition = self.network.transition(&self.parameters, &seen, &assessment, &index);
         let parameter = match (fixed, transition) {
             (Some(parameter), _) => parameter,
             (None, Some(gaussian)) => squash(finite(to_vec(&gaussian.mean)?, "transition")?[0]),
             (None, None) => 0.0,
         };
-        Ok(Judgement {
-            probabilities: self.token_probabilities(&logits),
-            value,
-            action: Action { token, parameter },
-        })
+        Ok(Judgement { probabilities: self.token_probabilities(&logits), value, action: Action { token, parameter } })
     }
 
     /// Softmax of the logits, summed over the choices of each token.
     fn token_probabilities(&self, logits: &[f32]) -> Vec<f32> {
         let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let weights: Vec<f64> = logits
-            .iter()
-            .map(|&logit| f64::from(logit - largest).exp())
-            .collect();
+        let weights: Vec<f64> = logits.iter().map(|&logit| f64::from(logit - largest).exp()).collect();
         let total: f64 = weights.iter().sum();
         let mut probabilities = vec![0.0f64; self.network.shape().tokens];
         for (choice, weight) in weights.iter().enumerate() {
@@ -174,12 +161,7 @@ impl LearnedPlanner {
     /// A planner that follows a policy.
     pub fn new(policy: Policy) -> LearnedPlanner {
         let shape = policy.shape();
-        LearnedPlanner {
-            policy,
-            features: vec![0.0; shape.len()],
-            valid: vec![false; shape.tokens],
-            judgement: None,
-        }
+        LearnedPlanner { policy, features: vec![0.0; shape.len()], valid: vec![false; shape.tokens], judgement: None }
     }
 
     /// The policy.
@@ -198,10 +180,7 @@ impl Planner for LearnedPlanner {
         self.policy.run.network.kind().to_owned()
     }
 
-    fn decide(
-        &mut self,
-        context: &DecisionContext<'_>,
-    ) -> std::result::Result<Decision, PlannerError> {
+    fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {
         self.judgement = None;
         let failed = |error: TrainingError| PlannerError::Policy(error.to_string());
         let (count, slots) = (context.candidates.len(), self.valid.len());
@@ -213,23 +192,11 @@ impl Planner for LearnedPlanner {
             }));
         }
         if count == 0 {
-            let ticks = context
-                .model
-                .period
-                .ticks_ceil(crate::strips::WAIT_S)
-                .max(1);
+            let ticks = context.model.period.ticks_ceil(crate::strips::WAIT_S).max(1);
             return Ok(Decision::Wait { ticks });
         }
-        observe(
-            context,
-            self.policy.set,
-            &mut self.features,
-            &mut self.valid,
-        );
-        let judgement = self
-            .policy
-            .judge(&self.features, &self.valid)
-            .map_err(failed)?;
+        observe(context, self.policy.set, &mut self.features, &mut self.valid);
+        let judgement = self.policy.judge(&self.features, &self.valid).map_err(failed)?;
         let action = judgement.action;
         self.judgement = Some(judgement);
         Ok(decision(context.model, action))

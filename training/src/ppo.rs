@@ -77,11 +77,7 @@ impl Ppo {
     /// A fresh learner for `count` weights.
     pub fn new(config: PpoConfig, count: usize, device: Device) -> Ppo {
         let kl_coefficient = config.kl_penalty.map_or(0.0, |penalty| penalty.coefficient);
-        Ppo {
-            adam: Adam::new(count, device),
-            kl_coefficient,
-            config,
-        }
+        Ppo { adam: Adam::new(count, device), kl_coefficient, config }
     }
 
     /// Improves the weights by several passes over a batch of experience.
@@ -100,25 +96,21 @@ impl Ppo {
         let device = parameters.flat.device();
         let batch = Batch::new(network, segments, device)?;
         let mut order: Vec<i64> = (0..batch.len() as i64).collect();
-        let mut statistics = UpdateStatistics {
-            explained_variance: explained_variance(segments),
-            ..UpdateStatistics::default()
-        };
+        let mut statistics =
+            UpdateStatistics { explained_variance: explained_variance(segments), ..UpdateStatistics::default() };
         let (mut sums, mut norm, mut minibatches) = ([0.0; SUMS], 0.0, 0.0);
         for _ in 0..self.config.epochs {
             order.shuffle(rng);
             let mut kl = 0.0;
             for minibatch in order.chunks(self.config.minibatch) {
-                let (gradient, shard_sums) =
-                    self.gradient(network, parameters, &batch, minibatch)?;
+                let (gradient, shard_sums) = self.gradient(network, parameters, &batch, minibatch)?;
                 let length = gradient.norm().double_value(&[]);
                 if !length.is_finite() {
                     let quantity = "the gradient";
                     return Err(TrainingError::NotFinite { quantity, step });
                 }
                 let scale = (self.config.gradient_norm / (length + 1e-6)).min(1.0);
-                self.adam
-                    .step(parameters, &(gradient * scale), learning_rate);
+                self.adam.step(parameters, &(gradient * scale), learning_rate);
                 for (sum, shard_sum) in sums.iter_mut().zip(shard_sums) {
                     *sum += shard_sum;
                 }
@@ -128,11 +120,7 @@ impl Ppo {
             }
             statistics.kl = kl / batch.len() as f64;
             statistics.epochs += 1.0;
-            if self
-                .config
-                .kl_stop
-                .is_some_and(|limit| statistics.kl > limit)
-            {
+            if self.config.kl_stop.is_some_and(|limit| statistics.kl > limit) {
                 break;
             }
         }
@@ -157,25 +145,16 @@ impl Ppo {
         minibatch: &[i64],
     ) -> Result<(Tensor, [f64; SUMS])> {
         let shard = minibatch.len().div_ceil(self.config.shards);
-        let objective = Objective {
-            config: &self.config,
-            kl_coefficient: self.kl_coefficient,
-            network,
-        };
-        let tasks: Vec<(Parameters, Batch)> = minibatch
-            .chunks(shard)
-            .map(|rows| (parameters.share(), batch.rows(rows)))
-            .collect();
+        let objective = Objective { config: &self.config, kl_coefficient: self.kl_coefficient, network };
+        let tasks: Vec<(Parameters, Batch)> =
+            minibatch.chunks(shard).map(|rows| (parameters.share(), batch.rows(rows))).collect();
         let results: Vec<Result<(Tensor, [f64; SUMS])>> = tasks
             .into_par_iter()
             .map(|(parameters, rows)| {
                 let (loss, sums) = objective.loss(&parameters, &rows);
                 let gradient = parameters.gradient(&(loss / minibatch.len() as f64))?;
                 let sums = rollout::to_vec(&sums)?;
-                Ok((
-                    gradient,
-                    std::array::from_fn(|index| f64::from(sums[index])),
-                ))
+                Ok((gradient, std::array::from_fn(|index| f64::from(sums[index]))))
             })
             .collect();
         let mut total: Option<(Tensor, [f64; SUMS])> = None;
@@ -183,10 +162,9 @@ impl Ppo {
             let (gradient, sums) = result?;
             total = Some(match total {
                 None => (gradient, sums),
-                Some((so_far, so_far_sums)) => (
-                    so_far + gradient,
-                    std::array::from_fn(|index| so_far_sums[index] + sums[index]),
-                ),
+                Some((so_far, so_far_sums)) => {
+                    (so_far + gradient, std::array::from_fn(|index| so_far_sums[index] + sums[index]))
+                }
             });
         }
         total.ok_or_else(|| TrainingError::Environment("a minibatch is empty".into()))
@@ -210,12 +188,10 @@ impl Objective<'_> {
         let assessment = network.assess(parameters, &batch.observations);
         let logs = distribution::log_probabilities(&assessment.logits);
         let old = &batch.log_probabilities;
-        let choice_ratio =
-            distribution::chosen(&logs, &batch.choice) - distribution::chosen(old, &batch.choice);
+        let choice_ratio = distribution::chosen(&logs, &batch.choice) - distribution::chosen(old, &batch.choice);
         let entropy = distribution::entropy(&logs);
         let mut kl = distribution::categorical_kl(old, &logs);
-        let transition =
-            network.transition(parameters, &batch.observations, &assessment, &batch.choice);
+        let transition = network.transition(parameters, &batch.observations, &assessment, &batch.choice);
         let mut transition_entropy = entropy.zeros_like();
         let (surrogate, clipped) = match transition {
             None => self.surrogate(&choice_ratio, &batch.advantage),
@@ -237,14 +213,7 @@ impl Objective<'_> {
             Some(limit) => error.clamp_max(limit),
             None => error,
         };
-        let parts = [
-            &surrogate,
-            &error,
-            &kl,
-            &clipped,
-            &entropy,
-            &transition_entropy,
-        ];
+        let parts = [&surrogate, &error, &kl, &clipped, &entropy, &transition_entropy];
         let sums = Tensor::stack(&parts, 0).sum_dim_intlist(-1, false, Kind::Float);
         let weights = [
             -1.0,
@@ -254,9 +223,7 @@ impl Objective<'_> {
             -config.entropy_coefficient,
             -config.transition_entropy_coefficient,
         ];
-        let weights = Tensor::from_slice(&weights)
-            .to_kind(Kind::Float)
-            .to_device(sums.device());
+        let weights = Tensor::from_slice(&weights).to_kind(Kind::Float).to_device(sums.device());
         ((&sums * weights).sum(Kind::Float), sums.detach())
     }
 
@@ -283,11 +250,7 @@ impl Batch {
         let padded = !valid.iter().all(|&valid| valid);
         let observations = Observations {
             features: join(|it| &it.features).view(shape),
-            valid: padded.then(|| {
-                Tensor::from_slice(&valid)
-                    .view([-1, tokens as i64])
-                    .to_device(device)
-            }),
+            valid: padded.then(|| Tensor::from_slice(&valid).view([-1, tokens as i64]).to_device(device)),
         };
         let logits = join(|it| &it.logits).view([-1, network.choices() as i64]);
         let latent = join(|it| &it.latent);
@@ -340,26 +303,11 @@ fn standardised(x: &Tensor) -> Tensor {
 
 /// 1 − variance of (return − value) / variance of the returns; 0 when all returns are equal.
 fn explained_variance(segments: &[Segment]) -> f64 {
-    let errors = || {
-        segments
-            .iter()
-            .flat_map(|it| &it.advantage)
-            .map(|&x| f64::from(x))
-    };
-    let values = segments
-        .iter()
-        .flat_map(|it| &it.value)
-        .map(|&x| f64::from(x));
-    let returns: Vec<f64> = errors()
-        .zip(values)
-        .map(|(error, value)| error + value)
-        .collect();
+    let errors = || segments.iter().flat_map(|it| &it.advantage).map(|&x| f64::from(x));
+    let values = segments.iter().flat_map(|it| &it.value).map(|&x| f64::from(x));
+    let returns: Vec<f64> = errors().zip(values).map(|(error, value)| error + value).collect();
     let spread = variance(returns.iter().copied());
-    if spread > 0.0 {
-        1.0 - variance(errors()) / spread
-    } else {
-        0.0
-    }
+    if spread > 0.0 { 1.0 - variance(errors()) / spread } else { 0.0 }
 }
 
 fn variance(numbers: impl Iterator<Item = f64> + Clone) -> f64 {

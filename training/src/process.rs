@@ -13,10 +13,7 @@ pub fn prepare() {
     keep_freed_memory();
     // SAFETY: the name is a C string, and loading a library runs no code of ours.
     unsafe {
-        libc::dlopen(
-            c"libtorch_cuda.so".as_ptr(),
-            libc::RTLD_NOW | libc::RTLD_GLOBAL,
-        );
+        libc::dlopen(c"libtorch_cuda.so".as_ptr(), libc::RTLD_NOW | libc::RTLD_GLOBAL);
     }
 }
 
@@ -53,17 +50,12 @@ pub fn make_threads(count: usize) -> Result<()> {
 /// # Errors
 /// Another name, or no CUDA device at hand.
 pub fn device(name: &str) -> Result<Device> {
-    let refused = |limit: &str| TrainingError::Setting {
-        key: "device".into(),
-        value: name.into(),
-        limit: limit.into(),
-    };
+    let refused =
+        |limit: &str| TrainingError::Setting { key: "device".into(), value: name.into(), limit: limit.into() };
     match name {
         "cpu" => Ok(Device::Cpu),
         "cuda" if tch::Cuda::is_available() => Ok(Device::Cuda(0)),
-        "cuda" => Err(refused(
-            "available: no CUDA device, or no libtorch_cuda.so of torch 2.11 on LD_LIBRARY_PATH",
-        )),
+        "cuda" => Err(refused("available: no CUDA device, or no libtorch_cuda.so of torch 2.11 on LD_LIBRARY_PATH")),
         _ => Err(refused("cpu or cuda")),
     }
 }

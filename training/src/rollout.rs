@@ -66,13 +66,7 @@ impl Slot {
         rng.set_stream(stream);
         let first = rng.random();
         environment.reset(first)?;
-        Ok(Slot {
-            environment,
-            rng,
-            seed: first,
-            actions: Vec::new(),
-            tally: Tally::default(),
-        })
+        Ok(Slot { environment, rng, seed: first, actions: Vec::new(), tally: Tally::default() })
     }
 
     /// Brings an environment back to a saved state.
@@ -87,9 +81,7 @@ impl Slot {
         slot.environment.reset(slot.seed)?;
         for action in state.actions {
             if slot.step(action)?.progress != Progress::Continues {
-                return Err(TrainingError::Environment(
-                    "a saved episode ends before its last action".into(),
-                ));
+                return Err(TrainingError::Environment("a saved episode ends before its last action".into()));
             }
         }
         Ok(slot)
@@ -97,11 +89,7 @@ impl Slot {
 
     /// What must be saved.
     pub fn state(&self) -> SlotState {
-        SlotState {
-            rng: self.rng.clone(),
-            seed: self.seed,
-            actions: self.actions.clone(),
-        }
+        SlotState { rng: self.rng.clone(), seed: self.seed, actions: self.actions.clone() }
     }
 
     fn step(&mut self, action: Action) -> Result<crate::environment::Outcome> {
@@ -191,17 +179,13 @@ impl Group {
     pub fn collect(&mut self, actor: &Actor, steps: usize, discount: Discount) -> Result<Segment> {
         let _guard = tch::no_grad_guard();
         let mut segment = Segment::default();
-        let mut decisions: Vec<Vec<gae::Decision>> =
-            vec![Vec::with_capacity(steps); self.slots.len()];
+        let mut decisions: Vec<Vec<gae::Decision>> = vec![Vec::with_capacity(steps); self.slots.len()];
         let mut last = Ends::default();
         for _ in 0..steps {
             self.step_all(actor, &mut segment, &mut decisions, &mut last)?;
         }
         for (index, slot) in self.slots.iter().enumerate() {
-            if decisions[index]
-                .last()
-                .is_some_and(|it| it.next == Next::Decision)
-            {
+            if decisions[index].last().is_some_and(|it| it.next == Next::Decision) {
                 last.note(slot, self.shape, (index, steps - 1))?;
             }
         }
@@ -271,10 +255,7 @@ impl Group {
             let valid = &mut segment.valid[entry * tokens..][..tokens];
             slot.environment.observe(features, valid)?;
         }
-        Ok((
-            &segment.features[first * numbers..],
-            &segment.valid[first * tokens..],
-        ))
+        Ok((&segment.features[first * numbers..], &segment.valid[first * tokens..]))
     }
 
     /// Draws a choice and a latent for every environment.
@@ -284,33 +265,21 @@ impl Group {
         let logits = finite(to_vec(&assessment.logits)?, "choice")?;
         let first = segment.choice.len();
         for (slot, row) in self.slots.iter_mut().zip(logits.chunks(choices)) {
-            segment
-                .choice
-                .push(sample_choice(row, &mut slot.rng) as i64);
+            segment.choice.push(sample_choice(row, &mut slot.rng) as i64);
         }
         segment.logits.extend(logits);
-        segment
-            .value
-            .extend(finite(to_vec(&assessment.value)?, "value")?);
+        segment.value.extend(finite(to_vec(&assessment.value)?, "value")?);
         let choice = Tensor::from_slice(&segment.choice[first..]).to_device(actor.device);
-        let transition = actor
-            .network
-            .transition(&actor.parameters, seen, &assessment, &choice);
+        let transition = actor.network.transition(&actor.parameters, seen, &assessment, &choice);
         let Some(gaussian) = transition else {
-            segment
-                .latent
-                .extend(std::iter::repeat_n(0.0, self.slots.len()));
-            segment
-                .gaussian
-                .extend(std::iter::repeat_n(0.0, 2 * self.slots.len()));
+            segment.latent.extend(std::iter::repeat_n(0.0, self.slots.len()));
+            segment.gaussian.extend(std::iter::repeat_n(0.0, 2 * self.slots.len()));
             return Ok(());
         };
         let means = finite(to_vec(&gaussian.mean)?, "transition")?;
         let deviations = finite(to_vec(&gaussian.log_deviation)?, "transition")?;
         for (slot, (mean, deviation)) in self.slots.iter_mut().zip(means.iter().zip(&deviations)) {
-            segment
-                .latent
-                .push(sample_latent(*mean, *deviation, &mut slot.rng));
+            segment.latent.push(sample_latent(*mean, *deviation, &mut slot.rng));
             segment.gaussian.extend([mean, deviation]);
         }
         Ok(())
@@ -331,51 +300,32 @@ impl Ends {
         let (numbers, tokens) = (self.features.len(), self.valid.len());
         self.features.resize(numbers + shape.len(), 0.0);
         self.valid.resize(tokens + shape.tokens, false);
-        slot.environment
-            .observe(&mut self.features[numbers..], &mut self.valid[tokens..])?;
+        slot.environment.observe(&mut self.features[numbers..], &mut self.valid[tokens..])?;
         self.places.push(place);
         Ok(())
     }
 
-    fn evaluate(
-        &self,
-        actor: &Actor,
-        shape: ObservationShape,
-        decisions: &mut [Vec<gae::Decision>],
-    ) -> Result<()> {
+    fn evaluate(&self, actor: &Actor, shape: ObservationShape, decisions: &mut [Vec<gae::Decision>]) -> Result<()> {
         if self.places.is_empty() {
             return Ok(());
         }
         let seen = observations(&self.features, &self.valid, shape, actor.device);
         let assessment = actor.network.assess(&actor.parameters, &seen);
         for (value, &(slot, index)) in to_vec(&assessment.value)?.iter().zip(&self.places) {
-            decisions[slot][index].next = Next::Cut {
-                value: f64::from(*value),
-            };
+            decisions[slot][index].next = Next::Cut { value: f64::from(*value) };
         }
         Ok(())
     }
 }
 
 /// Tensors of a batch of observations given as rows.
-pub fn observations(
-    features: &[f32],
-    valid: &[bool],
-    shape: ObservationShape,
-    device: Device,
-) -> Observations {
+pub fn observations(features: &[f32], valid: &[bool], shape: ObservationShape, device: Device) -> Observations {
     let (tokens, width) = (shape.tokens as i64, shape.features as i64);
     let features = Tensor::from_slice(features).view([-1, tokens, width]);
     // Skipping the mask where nothing is padded changes no number and saves time.
-    let valid = (!valid.iter().all(|&valid| valid)).then(|| {
-        Tensor::from_slice(valid)
-            .view([-1, tokens])
-            .to_device(device)
-    });
-    Observations {
-        features: features.to_device(device),
-        valid,
-    }
+    let valid =
+        (!valid.iter().all(|&valid| valid)).then(|| Tensor::from_slice(valid).view([-1, tokens]).to_device(device));
+    Observations { features: features.to_device(device), valid }
 }
 
 /// The same numbers if all are finite.

@@ -92,11 +92,7 @@ impl Stored {
     pub fn new<N: Number>(shape: &[usize], numbers: &[N]) -> Stored {
         let mut bytes = Vec::with_capacity(size_of_val(numbers));
         numbers.iter().for_each(|number| number.put(&mut bytes));
-        Stored {
-            dtype: N::DTYPE,
-            shape: shape.to_vec(),
-            bytes,
-        }
+        Stored { dtype: N::DTYPE, shape: shape.to_vec(), bytes }
     }
 
     fn numbers<N: Number>(&self) -> Option<Vec<N>> {
@@ -108,8 +104,7 @@ impl Stored {
 impl Content {
     /// Adds a tensor.
     pub fn insert<N: Number>(&mut self, name: &str, shape: &[usize], numbers: &[N]) {
-        self.tensors
-            .insert(name.to_owned(), Stored::new(shape, numbers));
+        self.tensors.insert(name.to_owned(), Stored::new(shape, numbers));
     }
 
     /// The numbers of a tensor, whatever its shape.
@@ -118,17 +113,12 @@ impl Content {
     /// When it is missing or holds another kind of number; `path` is named.
     pub fn numbers<N: Number>(&self, name: &str, path: &Path) -> Result<Vec<N>> {
         let numbers = self.tensors.get(name).and_then(Stored::numbers);
-        numbers.ok_or_else(|| {
-            TrainingError::damaged(path, format!("it has no {:?} tensor {name}", N::DTYPE))
-        })
+        numbers.ok_or_else(|| TrainingError::damaged(path, format!("it has no {:?} tensor {name}", N::DTYPE)))
     }
 
     /// The file's bytes; the same content always gives the same bytes.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        let label = Label {
-            sha256: self.digest(),
-            header: self.header.clone(),
-        };
+        let label = Label { sha256: self.digest(), header: self.header.clone() };
         let metadata = HashMap::from([(LABEL.to_owned(), json(&label)?)]);
         safetensors::serialize(self.tensors.iter(), Some(metadata))
             .map_err(|error| TrainingError::Environment(error.to_string()))
@@ -140,25 +130,16 @@ impl Content {
     /// Anything but what [`Content::to_bytes`] wrote; `path` is named.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Content> {
         let damaged = |reason: String| TrainingError::damaged(path, reason);
-        let (_, metadata) =
-            SafeTensors::read_metadata(bytes).map_err(|error| damaged(error.to_string()))?;
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|error| damaged(error.to_string()))?;
         let label = metadata.metadata().as_ref().and_then(|it| it.get(LABEL));
         let label = label.ok_or_else(|| damaged("it was not written by swath-train".into()))?;
-        let label: Label =
-            serde_json::from_str(label).map_err(|error| damaged(error.to_string()))?;
+        let label: Label = serde_json::from_str(label).map_err(|error| damaged(error.to_string()))?;
         let views = SafeTensors::deserialize(bytes).map_err(|error| damaged(error.to_string()))?;
         let tensors = views.iter().map(|(name, view)| {
-            let stored = Stored {
-                dtype: view.dtype(),
-                shape: view.shape().to_vec(),
-                bytes: view.data().to_vec(),
-            };
+            let stored = Stored { dtype: view.dtype(), shape: view.shape().to_vec(), bytes: view.data().to_vec() };
             (name.to_owned(), stored)
         });
-        let content = Content {
-            header: label.header,
-            tensors: tensors.collect(),
-        };
+        let content = Content { header: label.header, tensors: tensors.collect() };
         if content.digest() != label.sha256 {
             return Err(damaged("its digest does not fit its content".into()));
         }
@@ -220,10 +201,7 @@ mod tests {
     use super::*;
 
     fn sample() -> Content {
-        let mut content = Content {
-            header: r#"{"a":1}"#.into(),
-            tensors: BTreeMap::new(),
-        };
+        let mut content = Content { header: r#"{"a":1}"#.into(), tensors: BTreeMap::new() };
         content.insert("weights", &[2, 2], &[1.0f32, -2.5, 3e-30, 4.0]);
         content.insert("seeds", &[3], &[1u64, u64::MAX, 7]);
         content
@@ -265,10 +243,7 @@ mod tests {
         // A folder where the partial file would go makes the write fail.
         fs::create_dir(folder.path().join("checkpoint.partial")).unwrap();
         let error = write_atomically(&path, b"new").unwrap_err();
-        assert!(
-            error.to_string().contains("checkpoint.safetensors"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("checkpoint.safetensors"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"good");
     }
 }

@@ -67,10 +67,7 @@ impl Strips {
 
 impl Environment for Strips {
     fn shape(&self) -> ObservationShape {
-        ObservationShape {
-            tokens: self.model.config.planning.candidates,
-            features: self.set.features(),
-        }
+        ObservationShape { tokens: self.model.config.planning.candidates, features: self.set.features() }
     }
 
     fn reset(&mut self, seed: u64) -> Result<()> {
@@ -93,11 +90,7 @@ impl Environment for Strips {
             reward: step.record.reward,
             duration_s: self.model.period.duration_s(step.record.ticks()) + waited_s,
             success: step.record.success(),
-            progress: if step.truncated {
-                Progress::Truncated
-            } else {
-                Progress::Continues
-            },
+            progress: if step.truncated { Progress::Truncated } else { Progress::Continues },
         })
     }
 
@@ -115,10 +108,9 @@ impl Environment for Strips {
         let longest_s = self.model.config.planning.t_pre_max_s;
         Ok(match self.teacher.decide(&env.context()).map_err(failed)? {
             Decision::Wait { .. } => None,
-            Decision::Image { candidate, t_pre } => Some(Action {
-                token: candidate,
-                parameter: self.model.period.duration_s(t_pre) / longest_s,
-            }),
+            Decision::Image { candidate, t_pre } => {
+                Some(Action { token: candidate, parameter: self.model.period.duration_s(t_pre) / longest_s })
+            }
         })
     }
 }
@@ -126,10 +118,7 @@ impl Environment for Strips {
 /// The decision that a policy's action stands for: T_pre is rounded up to whole ticks.
 pub fn decision(model: &Model, action: Action) -> Decision {
     let t_pre_s = action.parameter * model.config.planning.t_pre_max_s;
-    Decision::Image {
-        candidate: action.token,
-        t_pre: model.period.ticks_ceil(t_pre_s).min(model.t_pre_max()),
-    }
+    Decision::Image { candidate: action.token, t_pre: model.period.ticks_ceil(t_pre_s).min(model.t_pre_max()) }
 }
 
 fn failed(error: impl ToString) -> TrainingError {

@@ -19,9 +19,7 @@ impl EventWriter {
         let name = format!("events.out.tfevents.{:020.6}.swath-train", seconds);
         let path = folder.join(name);
         let file = File::create(&path).map_err(TrainingError::file("write", &path))?;
-        let mut writer = EventWriter {
-            file: BufWriter::new(file),
-        };
+        let mut writer = EventWriter { file: BufWriter::new(file) };
         let mut event = Message::default();
         event.double(1, seconds);
         event.bytes(3, b"brain.Event:2");
@@ -43,9 +41,7 @@ impl EventWriter {
         event.integer(2, step);
         event.bytes(5, &summary.0);
         self.record(&event.0, folder)?;
-        self.file
-            .flush()
-            .map_err(TrainingError::file("write", folder))
+        self.file.flush().map_err(TrainingError::file("write", folder))
     }
 
     fn record(&mut self, data: &[u8], folder: &Path) -> Result<()> {
@@ -67,9 +63,7 @@ fn framed(data: &[u8]) -> Vec<u8> {
 
 /// The CRC-32C that the format asks for, rotated and offset.
 fn masked_crc(data: &[u8]) -> u32 {
-    crc32c::crc32c(data)
-        .rotate_right(15)
-        .wrapping_add(0xa282_ead8)
+    crc32c::crc32c(data).rotate_right(15).wrapping_add(0xa282_ead8)
 }
 
 fn wall_time() -> f64 {

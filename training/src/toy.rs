@@ -61,9 +61,7 @@ impl Toy {
         let mut value = 0.0;
         for _ in 0..200 {
             let best = |draw: &Vec<(f64, f64)>| {
-                let gains = draw
-                    .iter()
-                    .map(|(worth, s)| gamma.powf(*s) * (worth + value));
+                let gains = draw.iter().map(|(worth, s)| gamma.powf(*s) * (worth + value));
                 gains.fold(f64::MIN, f64::max)
             };
             value = draws.iter().map(best).sum::<f64>() / samples as f64;
@@ -77,13 +75,8 @@ impl Toy {
             let (worth, duration_s) = self.prospect(token);
             gamma.powf(duration_s) * (worth + value)
         };
-        let token = (0..self.valid)
-            .max_by(|&a, &b| gain(a).total_cmp(&gain(b)))
-            .unwrap_or(0);
-        Action {
-            token,
-            parameter: f64::from(self.need[token]),
-        }
+        let token = (0..self.valid).max_by(|&a, &b| gain(a).total_cmp(&gain(b))).unwrap_or(0);
+        Action { token, parameter: f64::from(self.need[token]) }
     }
 
     /// Worth of a token and the duration of choosing it [s].
@@ -95,10 +88,7 @@ impl Toy {
 
 impl Environment for Toy {
     fn shape(&self) -> ObservationShape {
-        ObservationShape {
-            tokens: self.tokens,
-            features: FEATURES,
-        }
+        ObservationShape { tokens: self.tokens, features: FEATURES }
     }
 
     fn reset(&mut self, seed: u64) -> Result<()> {
@@ -122,22 +112,14 @@ impl Environment for Toy {
         let token = action.token.min(self.tokens - 1);
         let (worth, duration_s) = self.prospect(token);
         let error = action.parameter - f64::from(self.need[token]);
-        let share = if token < self.valid {
-            (1.0 - 4.0 * error * error).max(0.0)
-        } else {
-            0.0
-        };
+        let share = if token < self.valid { (1.0 - 4.0 * error * error).max(0.0) } else { 0.0 };
         self.step += 1;
         self.draw();
         Ok(Outcome {
             reward: worth * share,
             duration_s,
             success: share > 0.9,
-            progress: if self.step == STEPS {
-                Progress::Truncated
-            } else {
-                Progress::Continues
-            },
+            progress: if self.step == STEPS { Progress::Truncated } else { Progress::Continues },
         })
     }
 
@@ -156,9 +138,6 @@ impl Environment for Toy {
             worth / duration_s
         };
         let token = (0..self.valid).max_by(|&a, &b| rate(a).total_cmp(&rate(b)));
-        Ok(token.map(|token| Action {
-            token,
-            parameter: f64::from(self.need[token]),
-        }))
+        Ok(token.map(|token| Action { token, parameter: f64::from(self.need[token]) }))
     }
 }

@@ -125,11 +125,8 @@ impl Trainer {
         ppo.adam.second = tensor(&state.second);
         ppo.adam.steps = state.adam_steps;
         ppo.kl_coefficient = state.kl_coefficient;
-        let slots: Vec<Slot> = state
-            .slots
-            .into_par_iter()
-            .map(|slot| Slot::restore(environment(&run)?, slot))
-            .collect::<Result<_>>()?;
+        let slots: Vec<Slot> =
+            state.slots.into_par_iter().map(|slot| Slot::restore(environment(&run)?, slot)).collect::<Result<_>>()?;
         Ok(Trainer {
             groups: grouped(slots, &run, &network),
             reporting_period_s: first.reporting_period_s(),
@@ -161,9 +158,7 @@ impl Trainer {
         };
         let environment: Box<dyn Environment> = match &self.run.environment {
             EnvironmentConfig::Toy(toy) => Box::new(Toy::new(toy.tokens)),
-            EnvironmentConfig::Strips(strips) => {
-                Box::new(Strips::new(strips)?.with_teacher(config.teacher_t_pre_s))
-            }
+            EnvironmentConfig::Strips(strips) => Box::new(Strips::new(strips)?.with_teacher(config.teacher_t_pre_s)),
         };
         let likelihood = warm_start::clone_teacher(
             &self.run,
@@ -224,10 +219,7 @@ impl Trainer {
         let segments = self.gather()?;
         let learning_rate = self.learning_rate();
         let update = self.learn(&segments)?;
-        self.steps += segments
-            .iter()
-            .map(|it| it.choice.len() as u64)
-            .sum::<u64>();
+        self.steps += segments.iter().map(|it| it.choice.len() as u64).sum::<u64>();
         Ok(self.report(&segments, learning_rate, update))
     }
 
@@ -241,44 +233,24 @@ impl Trainer {
     /// Learns from one batch.
     pub fn learn(&mut self, segments: &[Segment]) -> Result<UpdateStatistics> {
         let learning_rate = self.learning_rate();
-        self.ppo.update(
-            &self.network,
-            &mut self.parameters,
-            segments,
-            learning_rate,
-            &mut self.rng,
-            self.steps,
-        )
+        self.ppo.update(&self.network, &mut self.parameters, segments, learning_rate, &mut self.rng, self.steps)
     }
 
     /// Steps all environments for one batch.
     pub fn gather(&mut self) -> Result<Vec<Segment>> {
         let steps = self.run.steps_per_environment();
-        let discount = Discount {
-            gamma: self.run.ppo.gamma,
-            lambda: self.run.ppo.lambda,
-        };
+        let discount = Discount { gamma: self.run.ppo.gamma, lambda: self.run.ppo.lambda };
         let device = self.parameters.flat.device();
         let network = &self.network;
-        let actors: Vec<Actor> = self
-            .groups
-            .iter()
-            .map(|_| Actor {
-                network,
-                parameters: self.parameters.share(),
-                device,
-            })
-            .collect();
+        let actors: Vec<Actor> =
+            self.groups.iter().map(|_| Actor { network, parameters: self.parameters.share(), device }).collect();
         self.groups
             .par_iter_mut()
             .zip(actors)
             .map(|(group, actor)| group.collect(&actor, steps, discount))
             .collect::<Result<_>>()
             .map_err(|error| match error {
-                TrainingError::PolicyNotFinite { quantity } => TrainingError::NotFinite {
-                    quantity,
-                    step: self.steps,
-                },
+                TrainingError::PolicyNotFinite { quantity } => TrainingError::NotFinite { quantity, step: self.steps },
                 error => error,
             })
     }
@@ -287,10 +259,8 @@ impl Trainer {
     fn report(&self, segments: &[Segment], learning_rate: f64, update: UpdateStatistics) -> Report {
         let mut all = Tally::default();
         segments.iter().for_each(|segment| all += segment.tally);
-        let finished: Vec<f64> = segments
-            .iter()
-            .flat_map(|segment| segment.finished.iter().map(|tally| tally.reward))
-            .collect();
+        let finished: Vec<f64> =
+            segments.iter().flat_map(|segment| segment.finished.iter().map(|tally| tally.reward)).collect();
         let attempts = all.attempts as f64;
         Report {
             steps: self.steps,
@@ -350,12 +320,5 @@ fn build(run: &RunConfig) -> Result<(Network, Layout, Box<dyn Environment>)> {
 fn grouped(slots: Vec<Slot>, run: &RunConfig, network: &Network) -> Vec<Group> {
     let mut slots = slots.into_iter();
     let count = run.rollout.environments / run.rollout.group;
-    (0..count)
-        .map(|_| {
-            Group::new(
-                slots.by_ref().take(run.rollout.group).collect(),
-                network.shape(),
-            )
-        })
-        .collect()
+    (0..count).map(|_| Group::new(slots.by_ref().take(run.rollout.group).collect(), network.shape())).collect()
 }

@@ -59,11 +59,7 @@ pub fn clone_teacher(
     Ok(sum / count)
 }
 
-fn watch(
-    network: &Network,
-    environment: &mut dyn Environment,
-    seeds: &mut ChaCha8Rng,
-) -> Result<Lesson> {
+fn watch(network: &Network, environment: &mut dyn Environment, seeds: &mut ChaCha8Rng) -> Result<Lesson> {
     let shape = network.shape();
     let mut lesson = Lesson::default();
     let mut idle = 0;
@@ -74,24 +70,17 @@ fn watch(
             lesson.features.resize(numbers + shape.len(), 0.0);
             lesson.valid.resize(tokens + shape.tokens, false);
             environment.observe(&mut lesson.features[numbers..], &mut lesson.valid[tokens..])?;
-            lesson
-                .choice
-                .push(network.encode(action.token, action.parameter) as i64);
+            lesson.choice.push(network.encode(action.token, action.parameter) as i64);
             lesson.latent.push(unsquash(action.parameter));
             idle = 0;
         } else {
             idle += 1;
         }
         if idle > 1000 {
-            return Err(TrainingError::Environment(
-                "there is no teacher to learn from".into(),
-            ));
+            return Err(TrainingError::Environment("there is no teacher to learn from".into()));
         }
         // Where the teacher would wait, the first token with no transition moves time on.
-        let action = action.unwrap_or(crate::environment::Action {
-            token: 0,
-            parameter: 0.0,
-        });
+        let action = action.unwrap_or(crate::environment::Action { token: 0, parameter: 0.0 });
         if environment.step(action)?.progress != Progress::Continues {
             environment.reset(rand::RngExt::random(seeds))?;
         }

@@ -85,32 +85,21 @@ fn learned(network: &str) -> f64 {
 fn hop_ppo_reaches_the_optimum_of_the_toy() {
     let network = r#"{ kind = "hop-ppo", dim = 16, heads = 2, layers = 1, feed_forward = 16, head = "pointer", discrete = [16], continuous = [32], critic = [16] }"#;
     let (found, optimum) = (learned(network), optimum());
-    assert!(
-        found > 0.95 * optimum && found <= 1.01 * optimum,
-        "{found} of {optimum}"
-    );
+    assert!(found > 0.95 * optimum && found <= 1.01 * optimum, "{found} of {optimum}");
 }
 
 #[test]
 fn discrete_ppo_learns_what_its_grid_allows() {
-    let network =
-        r#"{ kind = "discrete-ppo", granularity_s = 20.0, discrete = [64], critic = [32] }"#;
+    let network = r#"{ kind = "discrete-ppo", granularity_s = 20.0, discrete = [64], critic = [32] }"#;
     let (found, optimum) = (learned(network), optimum());
-    assert!(
-        found > 0.75 * optimum && found <= 1.01 * optimum,
-        "{found} of {optimum}"
-    );
+    assert!(found > 0.75 * optimum && found <= 1.01 * optimum, "{found} of {optimum}");
 }
 
 #[test]
 fn h_ppo_learns_with_an_objective_for_each_actor() {
-    let network =
-        r#"{ kind = "h-ppo", encoder = [64], discrete = [32], continuous = [32], critic = [32] }"#;
+    let network = r#"{ kind = "h-ppo", encoder = [64], discrete = [32], continuous = [32], critic = [32] }"#;
     let (found, optimum) = (learned(network), optimum());
-    assert!(
-        found > 0.75 * optimum && found <= 1.01 * optimum,
-        "{found} of {optimum}"
-    );
+    assert!(found > 0.75 * optimum && found <= 1.01 * optimum, "{found} of {optimum}");
 }
 
 #[test]
@@ -132,8 +121,5 @@ fn behaviour_cloning_makes_the_policy_do_what_the_teacher_does() {
             *count += usize::from(action.token == wanted.token && near);
         }
     }
-    assert!(
-        agreement[1] > 350 && agreement[1] > 2 * agreement[0],
-        "{agreement:?}"
-    );
+    assert!(agreement[1] > 350 && agreement[1] > 2 * agreement[0], "{agreement:?}");
 }

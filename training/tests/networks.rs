@@ -9,17 +9,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use swath_training::distribution::{best_choice, log_probabilities};
 use swath_training::environment::ObservationShape;
-use swath_training::network::{
-    DiscretePpo, HPpo, Head, HopPpo, HopPpoMlp, Network, NetworkConfig, Observations,
-};
+use swath_training::network::{DiscretePpo, HPpo, Head, HopPpo, HopPpoMlp, Network, NetworkConfig, Observations};
 use swath_training::parameters::{Layout, Parameters};
 use swath_training::rollout::to_vec;
 use tch::{Device, Tensor};
 
-const SHAPE: ObservationShape = ObservationShape {
-    tokens: 5,
-    features: 3,
-};
+const SHAPE: ObservationShape = ObservationShape { tokens: 5, features: 3 };
 const BATCH: usize = 4;
 
 type Row = Vec<f64>;
@@ -59,11 +54,7 @@ impl Weights {
         let scale = self.vector(&format!("{name}.weight"));
         let shift = self.vector(&format!("{name}.bias"));
         let normal = x.iter().map(|x| (x - mean) / (variance + 1e-5).sqrt());
-        normal
-            .zip(scale)
-            .zip(shift)
-            .map(|((x, a), b)| a * x + b)
-            .collect()
+        normal.zip(scale).zip(shift).map(|((x, a), b)| a * x + b).collect()
     }
 
     fn mlp(&self, name: &str, hidden: usize, x: &[f64]) -> Row {
@@ -71,20 +62,11 @@ impl Weights {
     }
 
     fn trunk(&self, name: &str, hidden: usize, x: &[f64]) -> Row {
-        (0..hidden).fold(x.to_vec(), |x, layer| {
-            relu(self.linear(&format!("{name}.{layer}"), &x))
-        })
+        (0..hidden).fold(x.to_vec(), |x, layer| relu(self.linear(&format!("{name}.{layer}"), &x)))
     }
 
     /// Section IV.C for one observation.
-    fn encode(
-        &self,
-        tokens: &Tokens,
-        valid: &[bool],
-        dim: usize,
-        heads: usize,
-        layers: usize,
-    ) -> Tokens {
+    fn encode(&self, tokens: &Tokens, valid: &[bool], dim: usize, heads: usize, layers: usize) -> Tokens {
         let mut x: Tokens = tokens
             .iter()
             .enumerate()
@@ -92,10 +74,7 @@ impl Weights {
             .collect();
         for layer in 0..layers {
             let name = |part: &str| format!("encoder.layer{layer}.{part}");
-            let normed: Tokens = x
-                .iter()
-                .map(|x| self.norm(&name("norm_attention"), x))
-                .collect();
+            let normed: Tokens = x.iter().map(|x| self.norm(&name("norm_attention"), x)).collect();
             let mixed = self.attend(&name("query_key_value"), &normed, valid, heads);
             for (x, mixed) in x.iter_mut().zip(mixed) {
                 *x = add(x, &self.linear(&name("project"), &mixed));
@@ -111,15 +90,11 @@ impl Weights {
         let dim = x[0].len();
         let width = dim / heads;
         let joined: Tokens = x.iter().map(|x| self.linear(name, x)).collect();
-        let part = |token: usize, which: usize, head: usize| {
-            &joined[token][which * dim + head * width..][..width]
-        };
+        let part = |token: usize, which: usize, head: usize| &joined[token][which * dim + head * width..][..width];
         let mut mixed = vec![vec![0.0; dim]; x.len()];
         for (query, out) in mixed.iter_mut().enumerate() {
             for head in 0..heads {
-                let score = |key: usize| {
-                    dot(part(query, 0, head), part(key, 1, head)) / (width as f64).sqrt()
-                };
+                let score = |key: usize| dot(part(query, 0, head), part(key, 1, head)) / (width as f64).sqrt();
                 let weight = |key: usize| if valid[key] { score(key).exp() } else { 0.0 };
                 let total: f64 = (0..x.len()).map(weight).sum();
                 for key in 0..x.len() {
@@ -149,9 +124,7 @@ fn relu(x: Row) -> Row {
 /// Equation 21.
 fn position(n: usize, dim: usize) -> Row {
     let angle = |i: usize| n as f64 / 10000f64.powf(2.0 * i as f64 / dim as f64);
-    (0..dim / 2)
-        .flat_map(|i| [angle(i).sin(), angle(i).cos()])
-        .collect()
+    (0..dim / 2).flat_map(|i| [angle(i).sin(), angle(i).cos()]).collect()
 }
 
 /// A network with weights large enough to matter, and a batch of observations with padding.
@@ -167,9 +140,7 @@ impl Case {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (network, layout) = Network::new(config, SHAPE, 120.0).unwrap();
         let parameters = Parameters::initial(&layout, &mut rng, Device::Cpu).unwrap();
-        let noise: Vec<f32> = (0..layout.count())
-            .map(|_| rng.random_range(-0.3..0.3))
-            .collect();
+        let noise: Vec<f32> = (0..layout.count()).map(|_| rng.random_range(-0.3..0.3)).collect();
         let flat = &parameters.flat + Tensor::from_slice(&noise);
         let parameters = Parameters::from_flat(&layout, flat).unwrap();
         let observations = (0..BATCH).map(|row| {
@@ -178,25 +149,13 @@ impl Case {
             let valid = (0..SHAPE.tokens).map(|token| token < SHAPE.tokens - row);
             (tokens.collect(), valid.collect())
         });
-        Case {
-            observations: observations.collect(),
-            weights: Weights::new(&layout, &parameters),
-            network,
-            parameters,
-        }
+        Case { observations: observations.collect(), weights: Weights::new(&layout, &parameters), network, parameters }
     }
 
     fn seen(&self) -> Observations {
-        let numbers = self
-            .observations
-            .iter()
-            .flat_map(|(tokens, _)| tokens.iter().flatten());
+        let numbers = self.observations.iter().flat_map(|(tokens, _)| tokens.iter().flatten());
         let features: Vec<f32> = numbers.map(|&x| x as f32).collect();
-        let valid: Vec<bool> = self
-            .observations
-            .iter()
-            .flat_map(|(_, valid)| valid.clone())
-            .collect();
+        let valid: Vec<bool> = self.observations.iter().flat_map(|(_, valid)| valid.clone()).collect();
         swath_training::rollout::observations(&features, &valid, SHAPE, Device::Cpu)
     }
 
@@ -209,10 +168,7 @@ impl Case {
         let seen = self.seen();
         let assessment = self.network.assess(&self.parameters, &seen);
         let choices = self.network.choices();
-        let (logits, values) = (
-            to_vec(&assessment.logits).unwrap(),
-            to_vec(&assessment.value).unwrap(),
-        );
+        let (logits, values) = (to_vec(&assessment.logits).unwrap(), to_vec(&assessment.value).unwrap());
         let probabilities = to_vec(&log_probabilities(&assessment.logits).exp()).unwrap();
         for (row, (tokens, valid)) in self.observations.iter().enumerate() {
             let (wanted, value) = expected(&self.weights, tokens, valid);
@@ -229,9 +185,7 @@ impl Case {
         }
         for token in 0..SHAPE.tokens {
             let choice = Tensor::from_slice(&[token as i64; BATCH]);
-            let found = self
-                .network
-                .transition(&self.parameters, &seen, &assessment, &choice);
+            let found = self.network.transition(&self.parameters, &seen, &assessment, &choice);
             for (row, (tokens, _)) in self.observations.iter().enumerate() {
                 let Some(wanted) = transition(&self.weights, tokens, token) else {
                     assert!(found.is_none());
@@ -265,15 +219,10 @@ fn hop_ppo_with_pointer_heads() {
     Case::new(&hop(Head::Pointer)).check(
         |weights, tokens, valid| {
             let code = weights.encode(tokens, valid, 8, 2, 2);
-            let logits = code
-                .iter()
-                .map(|token| weights.mlp("discrete", 1, token)[0])
-                .collect();
+            let logits = code.iter().map(|token| weights.mlp("discrete", 1, token)[0]).collect();
             let count = valid.iter().filter(|&&valid| valid).count() as f64;
             let real = || code.iter().zip(valid).filter(|(_, valid)| **valid);
-            let mean: Row = (0..8)
-                .map(|i| real().map(|(x, _)| x[i]).sum::<f64>() / count)
-                .collect();
+            let mean: Row = (0..8).map(|i| real().map(|(x, _)| x[i]).sum::<f64>() / count).collect();
             (logits, weights.mlp("critic", 1, &mean)[0])
         },
         |weights, tokens, token| Some(weights.mlp("continuous", 2, &tokens[token])),
@@ -285,10 +234,7 @@ fn hop_ppo_with_the_papers_flat_heads() {
     Case::new(&hop(Head::Flat)).check(
         |weights, tokens, valid| {
             let code = weights.encode(tokens, valid, 8, 2, 2).concat();
-            (
-                weights.mlp("discrete", 1, &code),
-                weights.mlp("critic", 1, &code)[0],
-            )
+            (weights.mlp("discrete", 1, &code), weights.mlp("critic", 1, &code)[0])
         },
         |weights, tokens, token| Some(weights.mlp("continuous", 2, &tokens[token])),
     );
@@ -305,10 +251,7 @@ fn hop_ppo_mlp() {
     Case::new(&config).check(
         |weights, tokens, _| {
             let code = weights.trunk("encoder", 2, &tokens.concat());
-            (
-                weights.mlp("discrete", 1, &code),
-                weights.mlp("critic", 1, &code)[0],
-            )
+            (weights.mlp("discrete", 1, &code), weights.mlp("critic", 1, &code)[0])
         },
         |weights, tokens, token| Some(weights.mlp("continuous", 1, &tokens[token])),
     );
@@ -316,12 +259,8 @@ fn hop_ppo_mlp() {
 
 #[test]
 fn h_ppo_has_a_transition_for_every_token_and_a_critic_of_its_own() {
-    let config = NetworkConfig::HPpo(HPpo {
-        encoder: vec![9],
-        discrete: vec![6],
-        continuous: vec![7],
-        critic: vec![4, 3],
-    });
+    let config =
+        NetworkConfig::HPpo(HPpo { encoder: vec![9], discrete: vec![6], continuous: vec![7], critic: vec![4, 3] });
     Case::new(&config).check(
         |weights, tokens, _| {
             let code = weights.trunk("encoder", 1, &tokens.concat());
@@ -338,19 +277,12 @@ fn h_ppo_has_a_transition_for_every_token_and_a_critic_of_its_own() {
 
 #[test]
 fn discrete_ppo_has_a_choice_for_every_strip_and_time() {
-    let config = NetworkConfig::DiscretePpo(DiscretePpo {
-        granularity_s: 60.0,
-        discrete: vec![6],
-        critic: vec![4],
-    });
+    let config = NetworkConfig::DiscretePpo(DiscretePpo { granularity_s: 60.0, discrete: vec![6], critic: vec![4] });
     let case = Case::new(&config);
     case.check(
         |weights, tokens, _| {
             let flat = tokens.concat();
-            (
-                weights.mlp("discrete", 1, &flat),
-                weights.mlp("critic", 1, &flat)[0],
-            )
+            (weights.mlp("discrete", 1, &flat), weights.mlp("critic", 1, &flat)[0])
         },
         |_, _, _| None,
     );
@@ -373,14 +305,8 @@ fn what_stands_in_padding_changes_nothing() {
             padding.for_each(|(token, _)| token.fill(0.9));
         }
         let after = case.network.assess(&case.parameters, &case.seen());
-        assert_eq!(
-            to_vec(&before.logits).unwrap(),
-            to_vec(&after.logits).unwrap()
-        );
-        assert_eq!(
-            to_vec(&before.value).unwrap(),
-            to_vec(&after.value).unwrap()
-        );
+        assert_eq!(to_vec(&before.logits).unwrap(), to_vec(&after.logits).unwrap());
+        assert_eq!(to_vec(&before.value).unwrap(), to_vec(&after.value).unwrap());
         let logits = to_vec(&after.logits).unwrap();
         for (row, (_, valid)) in case.observations.iter().enumerate() {
             let best = best_choice(&logits[row * SHAPE.tokens..][..SHAPE.tokens]);
@@ -391,16 +317,9 @@ fn what_stands_in_padding_changes_nothing() {
 
 #[test]
 fn sizes_that_cannot_be_built_are_refused_by_name() {
-    let refused = |config: NetworkConfig| {
-        Network::new(&config, SHAPE, 120.0)
-            .map(|_| ())
-            .unwrap_err()
-            .to_string()
-    };
+    let refused = |config: NetworkConfig| Network::new(&config, SHAPE, 120.0).map(|_| ()).unwrap_err().to_string();
     let with = |change: fn(&mut HopPpo)| {
-        let NetworkConfig::HopPpo(mut sizes) = hop(Head::Flat) else {
-            unreachable!()
-        };
+        let NetworkConfig::HopPpo(mut sizes) = hop(Head::Flat) else { unreachable!() };
         change(&mut sizes);
         refused(NetworkConfig::HopPpo(sizes))
     };
@@ -408,13 +327,7 @@ fn sizes_that_cannot_be_built_are_refused_by_name() {
     assert!(with(|it| it.dim = 0).contains("network.dim is 0"));
     assert!(with(|it| it.layers = 1000).contains("network.layers is 1000"));
     assert!(with(|it| it.discrete = vec![0]).contains("network.discrete is 0"));
-    let granularity = refused(NetworkConfig::DiscretePpo(DiscretePpo {
-        granularity_s: 50.0,
-        discrete: vec![6],
-        critic: vec![4],
-    }));
-    assert!(
-        granularity.contains("network.granularity_s is 50"),
-        "{granularity}"
-    );
+    let granularity =
+        refused(NetworkConfig::DiscretePpo(DiscretePpo { granularity_s: 50.0, discrete: vec![6], critic: vec![4] }));
+    assert!(granularity.contains("network.granularity_s is 50"), "{granularity}");
 }

@@ -91,11 +91,8 @@ fn a_resumed_run_is_bit_equal_on_strips_over_ends_of_episodes() {
 fn the_number_of_threads_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let state = |threads: usize| {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .start_handler(|_| tch::set_num_threads(1))
-            .build()
-            .unwrap();
+        let pool =
+            ThreadPoolBuilder::new().num_threads(threads).start_handler(|_| tch::set_num_threads(1)).build().unwrap();
         pool.install(|| {
             let mut trainer = Trainer::new(run(TOY), Device::Cpu).unwrap();
             advance(&mut trainer, 3);
@@ -128,16 +125,10 @@ fn a_checkpoint_of_another_run_is_refused_with_the_setting_that_differs() {
         Trainer::resume(run, &path, Device::Cpu).map(|_| ())
     };
     let error = refused(|run| run.ppo.clip = 0.3).unwrap_err();
-    let TrainingError::Mismatch {
-        key, found, wanted, ..
-    } = error
-    else {
+    let TrainingError::Mismatch { key, found, wanted, .. } = error else {
         panic!("{error}");
     };
-    assert_eq!(
-        (key.as_str(), found.as_str(), wanted.as_str()),
-        ("ppo.clip", "0.2", "0.3")
-    );
+    assert_eq!((key.as_str(), found.as_str(), wanted.as_str()), ("ppo.clip", "0.2", "0.3"));
     assert!(matches!(
         refused(|run| run.seed = 9).unwrap_err(),
         TrainingError::Mismatch { key, .. } if key == "seed"
@@ -153,11 +144,7 @@ fn damaged_and_missing_checkpoints_are_refused_by_name() {
     checkpoint::save(&trainer, &path).unwrap();
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
-    let refused = || {
-        Trainer::resume(run(TOY), &path, Device::Cpu)
-            .map(|_| ())
-            .unwrap_err()
-    };
+    let refused = || Trainer::resume(run(TOY), &path, Device::Cpu).map(|_| ()).unwrap_err();
     assert!(refused().to_string().contains("cut.safetensors is damaged"));
     checkpoint::save_policy(&trainer, &path).unwrap();
     assert!(refused().to_string().contains("it is a policy"));
@@ -173,8 +160,5 @@ fn weights_that_are_not_finite_stop_the_run_with_the_step() {
     state.weights[0] = f32::NAN;
     let mut trainer = Trainer::restore(run(TOY), Device::Cpu, state).unwrap();
     let error = trainer.advance().map(|_| ()).unwrap_err();
-    assert!(
-        matches!(error, TrainingError::NotFinite { step: 60, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, TrainingError::NotFinite { step: 60, .. }), "{error}");
 }

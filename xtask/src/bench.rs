@@ -14,12 +14,7 @@ use crate::process;
 
 /// Builds all binaries, runs each crate's measurements in turn and prints the union.
 pub fn run(root: &Path) -> Result<()> {
-    process::run(process::cargo(root, "build").args([
-        "--quiet",
-        "--release",
-        "--workspace",
-        "--bins",
-    ]))?;
+    process::run(process::cargo(root, "build").args(["--quiet", "--release", "--workspace", "--bins"]))?;
     let mut all = Map::new();
     for package in packages_with_bench(root)? {
         eprintln!("measuring {package}");
@@ -38,11 +33,8 @@ pub fn run(root: &Path) -> Result<()> {
 fn packages_with_bench(root: &Path) -> Result<Vec<String>> {
     let mut cargo = process::cargo(root, "metadata");
     cargo.args(["--no-deps", "--format-version", "1"]);
-    let metadata: Value = serde_json::from_slice(&output(&mut cargo)?)
-        .context("cargo metadata did not print JSON")?;
-    let packages = metadata["packages"]
-        .as_array()
-        .context("cargo metadata lists no packages")?;
+    let metadata: Value = serde_json::from_slice(&output(&mut cargo)?).context("cargo metadata did not print JSON")?;
+    let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
     let mut names: Vec<String> = packages
         .iter()
         .filter(|package| has_bench(package))
@@ -56,9 +48,7 @@ fn has_bench(package: &Value) -> bool {
     let targets = package["targets"].as_array();
     targets.into_iter().flatten().any(|target| {
         target["name"] == "bench_json"
-            && target["kind"]
-                .as_array()
-                .is_some_and(|kinds| kinds.contains(&"example".into()))
+            && target["kind"].as_array().is_some_and(|kinds| kinds.contains(&"example".into()))
     })
 }
 

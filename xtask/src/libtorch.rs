@@ -9,11 +9,7 @@ use anyhow::{Context, Result, bail};
 use crate::process;
 
 const VERSION: &str = "2.11.0";
-const PLATFORMS: [&str; 3] = [
-    "manylinux_2_28_x86_64",
-    "manylinux_2_25_x86_64",
-    "manylinux2014_x86_64",
-];
+const PLATFORMS: [&str; 3] = ["manylinux_2_28_x86_64", "manylinux_2_25_x86_64", "manylinux2014_x86_64"];
 
 /// Makes `libtorch/` if it is not there; a LIBTORCH of the caller's own wins.
 ///
@@ -25,8 +21,7 @@ pub fn ensure(root: &Path) -> Result<()> {
         return check_version(Path::new(&own)).context("LIBTORCH is set by the caller");
     }
     if view.exists() {
-        return check_version(&view)
-            .with_context(|| format!("remove {} to have it made again", view.display()));
+        return check_version(&view).with_context(|| format!("remove {} to have it made again", view.display()));
     }
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
         bail!("set LIBTORCH to a libtorch {VERSION}: it is fetched for x86-64 Linux only");
@@ -45,16 +40,12 @@ pub fn ensure(root: &Path) -> Result<()> {
 
 fn check_version(view: &Path) -> Result<()> {
     let path = view.join("build-version");
-    let found = fs::read_to_string(&path)
-        .with_context(|| format!("{} is no libtorch: cannot read it", path.display()))?;
+    let found =
+        fs::read_to_string(&path).with_context(|| format!("{} is no libtorch: cannot read it", path.display()))?;
     // A build for the CPU alone calls itself 2.11.0+cpu.
     let version = found.trim().split('+').next().unwrap_or_default();
     if version != VERSION {
-        bail!(
-            "{} holds libtorch {}, not {VERSION}",
-            view.display(),
-            found.trim()
-        );
+        bail!("{} holds libtorch {}, not {VERSION}", view.display(), found.trim());
     }
     Ok(())
 }
@@ -69,8 +60,7 @@ fn download(root: &Path, wheels: &Path) -> Result<()> {
         pip.args(["--platform", platform]);
     }
     pip.arg("--dest").arg(wheels);
-    pip.arg("--requirement")
-        .arg(root.join("xtask/libtorch.txt"));
+    pip.arg("--requirement").arg(root.join("xtask/libtorch.txt"));
     process::run(&mut pip).context("libtorch cannot be fetched")
 }
 
@@ -104,9 +94,6 @@ mod tests {
         assert!(view_of("2.11.0").is_ok());
         assert!(view_of("2.11.0+cpu").is_ok());
         let error = view_of("2.1.0").unwrap_err().to_string();
-        assert!(
-            error.contains("2.1.0") && error.contains("2.11.0"),
-            "{error}"
-        );
+        assert!(error.contains("2.1.0") && error.contains("2.11.0"), "{error}");
     }
 }

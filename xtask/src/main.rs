@@ -83,13 +83,7 @@ fn test(root: &Path, args: &[OsString]) -> Result<()> {
 /// Builds all nodes, then becomes `swath launch`.
 fn mission(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, false)?;
-    process::run(process::cargo(root, "build").args([
-        "--quiet",
-        "--release",
-        "--package",
-        "swath-nodes",
-        "--bins",
-    ]))?;
+    process::run(process::cargo(root, "build").args(["--quiet", "--release", "--package", "swath-nodes", "--bins"]))?;
     let mut cargo = process::cargo(root, "run");
     cargo.args(["--quiet", "--release", "--package", "swath-nodes"]);
     cargo.args(["--bin", "swath", "--", "launch"]).args(args);
@@ -108,10 +102,7 @@ fn repository_root() -> Result<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let root = folder.context("the xtask folder has no parent")?;
     if !root.join("Cargo.toml").is_file() {
-        bail!(
-            "{} holds no Cargo.toml: build xtask again where the repository is now",
-            root.display()
-        );
+        bail!("{} holds no Cargo.toml: build xtask again where the repository is now", root.display());
     }
     Ok(root.to_path_buf())
 }

@@ -77,18 +77,10 @@ fn succeeds(command: &mut Command) -> bool {
 }
 
 fn advice(needed: &Prerequisite) -> String {
-    let manager = MANAGERS
-        .iter()
-        .position(|(program, _)| succeeds(Command::new(program).arg("--version")));
+    let manager = MANAGERS.iter().position(|(program, _)| succeeds(Command::new(program).arg("--version")));
     match manager {
-        Some(index) => format!(
-            "install it with `{} {}`",
-            MANAGERS[index].1, needed.packages[index]
-        ),
-        None => format!(
-            "install the package that your system calls something like {}",
-            needed.packages[0]
-        ),
+        Some(index) => format!("install it with `{} {}`", MANAGERS[index].1, needed.packages[index]),
+        None => format!("install the package that your system calls something like {}", needed.packages[0]),
     }
 }
 

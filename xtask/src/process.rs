@@ -18,9 +18,7 @@ pub fn cargo(root: &Path, subcommand: &str) -> Command {
 /// Runs to the end; an exit status other than 0 is an error.
 pub fn run(command: &mut Command) -> Result<()> {
     let line = line(command);
-    let status = command
-        .status()
-        .with_context(|| format!("cannot start `{line}`"))?;
+    let status = command.status().with_context(|| format!("cannot start `{line}`"))?;
     if !status.success() {
         bail!("`{line}` failed: {status}");
     }
@@ -38,8 +36,7 @@ pub fn lock(root: &Path) -> Result<File> {
     let path = root.join("target").join("xtask.lock");
     std::fs::create_dir_all(root.join("target")).context("cannot make the target folder")?;
     let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
-    file.lock()
-        .with_context(|| format!("cannot lock {}", path.display()))?;
+    file.lock().with_context(|| format!("cannot lock {}", path.display()))?;
     Ok(file)
 }
 

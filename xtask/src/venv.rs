@@ -22,11 +22,7 @@ pub fn ensure(root: &Path) -> Result<()> {
         return Ok(());
     }
     eprintln!("making the Python environment of the tests in .venv");
-    process::run(
-        Command::new("python3")
-            .args(["-m", "venv"])
-            .arg(root.join(".venv")),
-    )?;
+    process::run(Command::new("python3").args(["-m", "venv"]).arg(root.join(".venv")))?;
     if !files.is_empty() {
         let mut pip = Command::new(python(root));
         pip.args(["-m", "pip", "install", "--quiet"]);
@@ -45,25 +41,19 @@ fn requirement_files(root: &Path) -> Result<Vec<PathBuf>> {
     for folder in folders.clone() {
         folders.extend(subfolders(&folder)?);
     }
-    let mut files: Vec<PathBuf> = folders
-        .iter()
-        .map(|folder| folder.join("tests/requirements.txt"))
-        .filter(|file| file.is_file())
-        .collect();
+    let mut files: Vec<PathBuf> =
+        folders.iter().map(|folder| folder.join("tests/requirements.txt")).filter(|file| file.is_file()).collect();
     files.sort();
     Ok(files)
 }
 
 fn subfolders(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
-    let entries =
-        fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let entries = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
     for entry in entries {
         let entry = entry.with_context(|| format!("cannot read {}", folder.display()))?;
         let name = entry.file_name();
-        let skipped = ["target", "libtorch", "libtorch.partial", "out"]
-            .iter()
-            .any(|skip| name == *skip);
+        let skipped = ["target", "libtorch", "libtorch.partial", "out"].iter().any(|skip| name == *skip);
         let hidden = name.to_string_lossy().starts_with('.');
         if !skipped && !hidden && entry.path().is_dir() {
             found.push(entry.path());
@@ -75,8 +65,7 @@ fn subfolders(folder: &Path) -> Result<Vec<PathBuf>> {
 fn contents(files: &[PathBuf]) -> Result<String> {
     let mut text = String::new();
     for file in files {
-        text +=
-            &fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+        text += &fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
         text.push('\n');
     }
     Ok(text)

@@ -14,33 +14,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-ros", &["swath-msgs"]),
     ("swath-bags", &["swath-msgs", "swath-ros"]),
     ("swath-training", &["swath-sim"]),
-    (
-        "swath-nodes",
-        &[
-            "swath-sim",
-            "swath-msgs",
-            "swath-ros",
-            "swath-bags",
-            "swath-training",
-        ],
-    ),
+    ("swath-nodes", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-training"]),
     ("xtask", &[]),
 ];
 
 /// Dependencies that would break what a crate promises not to know.
 const FORBIDDEN: &[(&str, &[&str])] = &[
-    (
-        "swath-sim",
-        &[
-            "tch",
-            "torch-sys",
-            "ros2-client",
-            "rustdds",
-            "tracing",
-            "tokio",
-            "mcap",
-        ],
-    ),
+    ("swath-sim", &["tch", "torch-sys", "ros2-client", "rustdds", "tracing", "tokio", "mcap"]),
     ("swath-msgs", &["ros2-client", "rustdds"]),
     ("swath-ros", &["tch", "torch-sys", "mcap"]),
     ("swath-bags", &["tch", "torch-sys"]),
@@ -51,10 +31,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1"])
-        .args([
-            "--manifest-path",
-            concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml"),
-        ])
+        .args(["--manifest-path", concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml")])
         .output()
         .unwrap();
     assert!(output.status.success(), "{output:?}");
@@ -91,10 +68,7 @@ fn crates_know_only_what_the_architecture_allows() {
 fn crates_do_not_depend_on_what_they_must_not_know() {
     let found = dependencies();
     for (name, forbidden) in FORBIDDEN {
-        let extra: Vec<_> = forbidden
-            .iter()
-            .filter(|it| found[*name].contains(**it))
-            .collect();
+        let extra: Vec<_> = forbidden.iter().filter(|it| found[*name].contains(**it)).collect();
         assert!(extra.is_empty(), "{name} must not know {extra:?}");
     }
 }

@@ -60,10 +60,7 @@ pub struct SweepArgs {
 }
 
 fn range(text: &str) -> Result<[u32; 2], String> {
-    let number = |text: &str| {
-        text.parse()
-            .map_err(|_| format!("{text} is not a number of strips"))
-    };
+    let number = |text: &str| text.parse().map_err(|_| format!("{text} is not a number of strips"));
     match text.split_once("..") {
         None => Ok([number(text)?; 2]),
         Some((least, most)) => Ok([number(least)?, number(most)?]),
@@ -76,21 +73,14 @@ impl MissionArgs {
         let simulation = match &self.simulation {
             None => SimConfig::default(),
             Some(path) => {
-                let text = std::fs::read_to_string(path)
-                    .with_context(|| format!("cannot read {}", path.display()))?;
+                let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
                 toml::from_str(&text).with_context(|| format!("{} is not valid", path.display()))?
             }
         };
-        let scenario = ScenarioConfig {
-            count: self.requests,
-            ..ScenarioConfig::default()
-        };
+        let scenario = ScenarioConfig { count: self.requests, ..ScenarioConfig::default() };
         Ok(Missions {
             simulation,
-            episode: EpisodeConfig {
-                orbits: self.orbits,
-                scenario,
-            },
+            episode: EpisodeConfig { orbits: self.orbits, scenario },
             first_seed: self.seed,
             count: self.episodes,
         })
@@ -111,10 +101,7 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<()> {
     let missions = args.missions.missions()?;
     let flown = fly(&missions, &args.planners)?;
     let results = args.planners.iter().zip(&flown);
-    let entries: Vec<Value> = results
-        .clone()
-        .map(|(planner, own)| entry(planner, own, &flown[0]))
-        .collect();
+    let entries: Vec<Value> = results.clone().map(|(planner, own)| entry(planner, own, &flown[0])).collect();
     let mut table = String::from(HEADING);
     for (planner, own) in results {
         table += &row(&planner.to_string(), own, &flown[0]);
@@ -123,9 +110,7 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<()> {
         print(&table)?;
     }
     let whole = json!({ "missions": args.missions.describe(), "planners": entries });
-    args.json
-        .as_deref()
-        .map_or(Ok(()), |path| write_json(path, &whole))
+    args.json.as_deref().map_or(Ok(()), |path| write_json(path, &whole))
 }
 
 /// Runs `sweep`: the fixed-T heuristic with T of 10 to 120 s.
@@ -133,9 +118,7 @@ pub fn sweep(args: &SweepArgs) -> Result<()> {
     let times: Vec<f64> = (1..=12).map(|k| 10.0 * f64::from(k)).collect();
     let planners: Vec<PlannerSpec> = times.iter().map(|&t| PlannerSpec::Heuristic(t)).collect();
     let flown = fly(&args.missions.missions()?, &planners)?;
-    let rewards = flown
-        .iter()
-        .map(|own| spread(own, |it| it.reward_per_orbit).mean);
+    let rewards = flown.iter().map(|own| spread(own, |it| it.reward_per_orbit).mean);
     let best = times.iter().zip(rewards).max_by(|a, b| a.1.total_cmp(&b.1));
     let Some((best_s, _)) = best else {
         bail!("no mission was flown");
@@ -193,9 +176,8 @@ fn pooled_success(own: &[Mission]) -> f64 {
 fn gain(own: &[Mission], first: &[Mission]) -> Spread {
     let base = spread(first, |it| it.reward_per_orbit).mean;
     let pairs = own.iter().zip(first);
-    let differences: Vec<f64> = pairs
-        .map(|(own, first)| (own.reward_per_orbit - first.reward_per_orbit) / base)
-        .collect();
+    let differences: Vec<f64> =
+        pairs.map(|(own, first)| (own.reward_per_orbit - first.reward_per_orbit) / base).collect();
     spread_of(&differences)
 }
 
@@ -228,10 +210,7 @@ fn summary(own: &[Mission]) -> Value {
 fn by_density(own: &[Mission]) -> Vec<Value> {
     let mut groups: std::collections::BTreeMap<usize, Vec<Mission>> = Default::default();
     for mission in own {
-        groups
-            .entry(mission.requests / 1000 * 1000)
-            .or_default()
-            .push(*mission);
+        groups.entry(mission.requests / 1000 * 1000).or_default().push(*mission);
     }
     let summarised = groups.iter().map(|(least, missions)| {
         let mut entry = summary(missions);
@@ -252,6 +231,5 @@ fn write_json(path: &Path, value: &Value) -> Result<()> {
 
 fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())
-        .context("cannot write to standard output")
+    out.write_all(text.as_bytes()).context("cannot write to standard output")
 }

@@ -3,11 +3,14 @@
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 use swath_training::checkpoint;
 use swath_training::config::RunConfig;
 use swath_training::process;
@@ -16,9 +19,6 @@ use swath_training::trainer::{Report, Trainer};
 
 /// Checkpoints that are kept.
 const KEPT: usize = 2;
-
-/// Set by Ctrl-C: finish the update, save, leave.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Options of `swath-train train`.
 #[derive(Debug, Args)]
@@ -62,14 +62,8 @@ pub fn train(args: &TrainArgs) -> Result<()> {
         Some(from) => folder.resume(run, from.as_deref(), device)?,
         None => folder.begin(run, device)?,
     };
-    ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        eprintln!("\nstopping after this update; press Ctrl-C again to stop without saving");
-    })
-    .context("cannot catch Ctrl-C")?;
     let mut session = Session::new(&folder, &trainer)?;
+    session.catch_signals().context("cannot catch Ctrl-C")?;
     let stop_at = args.stop_after.unwrap_or(u64::MAX);
     let outcome = session.run(&mut trainer, stop_at);
     outcome.with_context(|| match checkpoint::newest(&folder.checkpoints()) {
@@ -98,10 +92,7 @@ impl Folder {
 
     fn begin(&self, run: RunConfig, device: tch::Device) -> Result<Trainer> {
         if let Ok(checkpoint) = checkpoint::newest(&self.checkpoints()) {
-            bail!(
-                "{} exists: go on with --resume, or choose another --out or seed",
-                checkpoint.display()
-            );
+            bail!("{} exists: go on with --resume, or choose another --out or seed", checkpoint.display());
         }
         let mut trainer = Trainer::new(run, device)?;
         fs::create_dir_all(self.checkpoints())
@@ -109,8 +100,7 @@ impl Folder {
         let text = toml::to_string(trainer.run()).context("cannot write the run as TOML")?;
         fs::write(self.path.join("run.toml"), text)
             .with_context(|| format!("cannot write to {}", self.path.display()))?;
-        fs::write(self.progress(), "")
-            .with_context(|| format!("cannot write {}", self.progress().display()))?;
+        fs::write(self.progress(), "").with_context(|| format!("cannot write {}", self.progress().display()))?;
         if let Some(likelihood) = trainer.warm_start()? {
             eprintln!("warm start: log-likelihood of the teacher's actions {likelihood:.3}");
         }
@@ -124,11 +114,7 @@ impl Folder {
             None => checkpoint::newest(&self.checkpoints())?,
         };
         let trainer = Trainer::resume(run, &path, device)?;
-        eprintln!(
-            "going on from {} at step {}",
-            path.display(),
-            trainer.steps()
-        );
+        eprintln!("going on from {} at step {}", path.display(), trainer.steps());
         fs::create_dir_all(self.checkpoints())
             .with_context(|| format!("cannot make {}", self.checkpoints().display()))?;
         self.forget_progress_after(trainer.steps())?;
@@ -143,8 +129,7 @@ impl Folder {
             report.is_ok_and(|report| report["steps"].as_u64().is_some_and(|it| it <= steps))
         });
         let kept: String = known.flat_map(|line| [line, "\n"]).collect();
-        fs::write(self.progress(), kept)
-            .with_context(|| format!("cannot write {}", self.progress().display()))
+        fs::write(self.progress(), kept).with_context(|| format!("cannot write {}", self.progress().display()))
     }
 }
 
@@ -156,6 +141,8 @@ struct Session<'a> {
     first_step: u64,
     saved_at: u64,
     last_return: f64,
+    /// Set by Ctrl-C: finish the update, save, leave.
+    stop: Arc<AtomicBool>,
 }
 
 impl<'a> Session<'a> {
@@ -167,14 +154,24 @@ impl<'a> Session<'a> {
             first_step: trainer.steps(),
             saved_at: trainer.steps(),
             last_return: f64::NAN,
+            stop: Arc::default(),
         })
+    }
+
+    /// The first Ctrl-C asks the run to stop and save; a second one ends the process at once.
+    fn catch_signals(&self) -> std::io::Result<()> {
+        for signal in [SIGINT, SIGTERM] {
+            flag::register_conditional_shutdown(signal, 130, self.stop.clone())?;
+            flag::register(signal, self.stop.clone())?;
+        }
+        Ok(())
     }
 
     fn run(&mut self, trainer: &mut Trainer, stop_at: u64) -> Result<()> {
         let every = trainer.run().checkpoint_every;
         loop {
             let due = trainer.steps() >= self.saved_at + every;
-            let stopping = STOP.load(Ordering::Relaxed) || trainer.steps() >= stop_at;
+            let stopping = self.stop.load(Ordering::Relaxed) || trainer.steps() >= stop_at;
             if trainer.is_finished() || stopping {
                 eprintln!();
                 return self.save(trainer);
@@ -191,10 +188,7 @@ impl<'a> Session<'a> {
 
     fn save(&mut self, trainer: &Trainer) -> Result<()> {
         let folder = self.folder.checkpoints();
-        checkpoint::save(
-            trainer,
-            &folder.join(checkpoint::file_name(trainer.steps())),
-        )?;
+        checkpoint::save(trainer, &folder.join(checkpoint::file_name(trainer.steps())))?;
         checkpoint::save_policy(trainer, &self.folder.path.join("policy.safetensors"))?;
         self.saved_at = trainer.steps();
         let all = checkpoint::list(&folder)?;
@@ -212,14 +206,9 @@ impl<'a> Session<'a> {
             self.last_return = report.episode_return;
         }
         let scalars = report.scalars(speed);
-        self.events
-            .scalars(report.steps, &scalars, &self.folder.path)?;
+        self.events.scalars(report.steps, &scalars, &self.folder.path)?;
         let mut line = serde_json::Map::from_iter([("steps".to_owned(), report.steps.into())]);
-        line.extend(
-            scalars
-                .iter()
-                .map(|(name, value)| ((*name).to_owned(), (*value).into())),
-        );
+        line.extend(scalars.iter().map(|(name, value)| ((*name).to_owned(), (*value).into())));
         let text = serde_json::Value::Object(line).to_string();
         let path = self.folder.progress();
         let file = OpenOptions::new().create(true).append(true).open(&path);

@@ -108,11 +108,7 @@ impl NetworkConfig {
     /// Checks every size against what can be built for this observation.
     pub fn validate(&self, shape: ObservationShape, parameter_scale_s: f64) -> Result<()> {
         if shape.is_empty() {
-            return Err(setting(
-                "environment",
-                format!("{shape:?}"),
-                "an observation with numbers in it",
-            ));
+            return Err(setting("environment", format!("{shape:?}"), "an observation with numbers in it"));
         }
         for (key, layers) in self.layers() {
             for &units in layers {
@@ -121,15 +117,10 @@ impl NetworkConfig {
         }
         match self {
             NetworkConfig::HopPpo(sizes) => sizes.validate(),
-            NetworkConfig::HopPpoMlp(HopPpoMlp { encoder, .. })
-            | NetworkConfig::HPpo(HPpo { encoder, .. })
+            NetworkConfig::HopPpoMlp(HopPpoMlp { encoder, .. }) | NetworkConfig::HPpo(HPpo { encoder, .. })
                 if encoder.is_empty() =>
             {
-                Err(setting(
-                    "network.encoder",
-                    "[]".into(),
-                    "at least one layer",
-                ))
+                Err(setting("network.encoder", "[]".into(), "at least one layer"))
             }
             NetworkConfig::DiscretePpo(sizes) => sizes.levels(parameter_scale_s).map(|_| ()),
             _ => Ok(()),
@@ -138,11 +129,9 @@ impl NetworkConfig {
 
     fn layers(&self) -> Vec<(&'static str, &[usize])> {
         match self {
-            NetworkConfig::HopPpo(it) => vec![
-                ("discrete", &it.discrete),
-                ("continuous", &it.continuous),
-                ("critic", &it.critic),
-            ],
+            NetworkConfig::HopPpo(it) => {
+                vec![("discrete", &it.discrete), ("continuous", &it.continuous), ("critic", &it.critic)]
+            }
             NetworkConfig::HopPpoMlp(it) => vec![
                 ("encoder", &it.encoder),
                 ("discrete", &it.discrete),
@@ -197,17 +186,9 @@ fn check(key: &str, value: usize, least: usize, most: usize) -> Result<()> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(setting(
-        key,
-        value.to_string(),
-        &format!("in {least} to {most}"),
-    ))
+    Err(setting(key, value.to_string(), &format!("in {least} to {most}")))
 }
 
 fn setting(key: &str, value: String, limit: &str) -> TrainingError {
-    TrainingError::Setting {
-        key: key.to_owned(),
-        value,
-        limit: limit.to_owned(),
-    }
+    TrainingError::Setting { key: key.to_owned(), value, limit: limit.to_owned() }
 }

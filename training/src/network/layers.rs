@@ -16,13 +16,7 @@ pub struct Linear {
 
 impl Linear {
     /// Declares the layer's two tensors.
-    pub fn new(
-        layout: &mut Layout,
-        name: &str,
-        inputs: usize,
-        outputs: usize,
-        gain: f64,
-    ) -> Linear {
+    pub fn new(layout: &mut Layout, name: &str, inputs: usize, outputs: usize, gain: f64) -> Linear {
         Linear {
             weight: layout.matrix(&format!("{name}.weight"), outputs, inputs, gain),
             bias: layout.vector(&format!("{name}.bias"), outputs, 0.0),
@@ -79,13 +73,7 @@ impl Mlp {
         output_gain: f64,
     ) -> Mlp {
         let (hidden, width) = stack(layout, name, inputs, hidden);
-        let output = Linear::new(
-            layout,
-            &format!("{name}.output"),
-            width,
-            outputs,
-            output_gain,
-        );
+        let output = Linear::new(layout, &format!("{name}.output"), width, outputs, output_gain);
         Mlp { hidden, output }
     }
 

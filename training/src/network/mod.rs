@@ -50,29 +50,10 @@ pub struct Network {
 
 #[derive(Debug, Clone)]
 enum Body {
-    Hop {
-        encoder: Transformer,
-        head: Head,
-        discrete: Mlp,
-        critic: Mlp,
-        continuous: Mlp,
-    },
-    HopMlp {
-        encoder: Trunk,
-        discrete: Mlp,
-        critic: Mlp,
-        continuous: Mlp,
-    },
-    H {
-        encoder: Trunk,
-        discrete: Mlp,
-        continuous: Mlp,
-        critic: Mlp,
-    },
-    Discrete {
-        discrete: Mlp,
-        critic: Mlp,
-    },
+    Hop { encoder: Transformer, head: Head, discrete: Mlp, critic: Mlp, continuous: Mlp },
+    HopMlp { encoder: Trunk, discrete: Mlp, critic: Mlp, continuous: Mlp },
+    H { encoder: Trunk, discrete: Mlp, continuous: Mlp, critic: Mlp },
+    Discrete { discrete: Mlp, critic: Mlp },
 }
 
 impl Network {
@@ -80,11 +61,7 @@ impl Network {
     ///
     /// # Errors
     /// A size that cannot be built.
-    pub fn new(
-        config: &NetworkConfig,
-        shape: ObservationShape,
-        parameter_scale_s: f64,
-    ) -> Result<(Network, Layout)> {
+    pub fn new(config: &NetworkConfig, shape: ObservationShape, parameter_scale_s: f64) -> Result<(Network, Layout)> {
         config.validate(shape, parameter_scale_s)?;
         let mut layout = Layout::default();
         let levels = match config {
@@ -97,12 +74,7 @@ impl Network {
             NetworkConfig::HPpo(sizes) => h(&mut layout, sizes, shape),
             NetworkConfig::DiscretePpo(sizes) => discrete(&mut layout, sizes, shape, levels),
         };
-        let network = Network {
-            body,
-            shape,
-            levels,
-            hybrid: !matches!(config, NetworkConfig::DiscretePpo(_)),
-        };
+        let network = Network { body, shape, levels, hybrid: !matches!(config, NetworkConfig::DiscretePpo(_)) };
         Ok((network, layout))
     }
 
@@ -150,13 +122,7 @@ impl Network {
         let x = &observations.features;
         let flat = || x.flatten(1, -1);
         let (logits, value, transitions) = match &self.body {
-            Body::Hop {
-                encoder,
-                head,
-                discrete,
-                critic,
-                ..
-            } => {
+            Body::Hop { encoder, head, discrete, critic, .. } => {
                 let padding = observations.valid.as_ref().map(attention_padding);
                 let tokens = encoder.forward(parameters, x, padding.as_ref());
                 let (for_actor, for_critic) = match head {
@@ -170,42 +136,24 @@ impl Network {
                 let logits = logits.view([-1, self.shape.tokens as i64]);
                 (logits, critic.forward(parameters, &for_critic), None)
             }
-            Body::HopMlp {
-                encoder,
-                discrete,
-                critic,
-                ..
-            } => {
+            Body::HopMlp { encoder, discrete, critic, .. } => {
                 let code = encoder.forward(parameters, &flat());
                 let logits = discrete.forward(parameters, &code);
                 (logits, critic.forward(parameters, &code), None)
             }
-            Body::H {
-                encoder,
-                discrete,
-                continuous,
-                critic,
-            } => {
+            Body::H { encoder, discrete, continuous, critic } => {
                 let code = encoder.forward(parameters, &flat());
                 let logits = discrete.forward(parameters, &code);
                 let transitions = continuous.forward(parameters, &code);
                 let transitions = transitions.view([-1, self.shape.tokens as i64, 2]);
-                (
-                    logits,
-                    critic.forward(parameters, &flat()),
-                    Some(transitions),
-                )
+                (logits, critic.forward(parameters, &flat()), Some(transitions))
             }
             Body::Discrete { discrete, critic } => {
                 let logits = discrete.forward(parameters, &flat());
                 (logits, critic.forward(parameters, &flat()), None)
             }
         };
-        Assessment {
-            logits: self.mask(logits, observations.valid.as_ref()),
-            value: value.squeeze_dim(-1),
-            transitions,
-        }
+        Assessment { logits: self.mask(logits, observations.valid.as_ref()), value: value.squeeze_dim(-1), transitions }
     }
 
     /// The distribution of the transition for the chosen tokens, [batch] of i64; `None` for a
@@ -279,14 +227,7 @@ fn hop(layout: &mut Layout, sizes: &HopPpo, shape: ObservationShape) -> Body {
     Body::Hop {
         encoder,
         head: sizes.head,
-        discrete: Mlp::new(
-            layout,
-            "discrete",
-            inputs,
-            &sizes.discrete,
-            scores,
-            ACTOR_GAIN,
-        ),
+        discrete: Mlp::new(layout, "discrete", inputs, &sizes.discrete, scores, ACTOR_GAIN),
         critic: Mlp::new(layout, "critic", pooled, &sizes.critic, 1, 1.0),
         continuous: continuous(layout, &sizes.continuous, shape),
     }
@@ -297,14 +238,7 @@ fn hop_mlp(layout: &mut Layout, sizes: &HopPpoMlp, shape: ObservationShape) -> B
     let width = encoder.width;
     Body::HopMlp {
         encoder,
-        discrete: Mlp::new(
-            layout,
-            "discrete",
-            width,
-            &sizes.discrete,
-            shape.tokens,
-            ACTOR_GAIN,
-        ),
+        discrete: Mlp::new(layout, "discrete", width, &sizes.discrete, shape.tokens, ACTOR_GAIN),
         critic: Mlp::new(layout, "critic", width, &sizes.critic, 1, 1.0),
         continuous: continuous(layout, &sizes.continuous, shape),
     }
@@ -315,42 +249,16 @@ fn h(layout: &mut Layout, sizes: &HPpo, shape: ObservationShape) -> Body {
     let (width, tokens) = (encoder.width, shape.tokens);
     Body::H {
         encoder,
-        discrete: Mlp::new(
-            layout,
-            "discrete",
-            width,
-            &sizes.discrete,
-            tokens,
-            ACTOR_GAIN,
-        ),
-        continuous: Mlp::new(
-            layout,
-            "continuous",
-            width,
-            &sizes.continuous,
-            2 * tokens,
-            ACTOR_GAIN,
-        ),
+        discrete: Mlp::new(layout, "discrete", width, &sizes.discrete, tokens, ACTOR_GAIN),
+        continuous: Mlp::new(layout, "continuous", width, &sizes.continuous, 2 * tokens, ACTOR_GAIN),
         critic: Mlp::new(layout, "critic", shape.len(), &sizes.critic, 1, 1.0),
     }
 }
 
-fn discrete(
-    layout: &mut Layout,
-    sizes: &DiscretePpo,
-    shape: ObservationShape,
-    levels: usize,
-) -> Body {
+fn discrete(layout: &mut Layout, sizes: &DiscretePpo, shape: ObservationShape, levels: usize) -> Body {
     let choices = shape.tokens * levels;
     Body::Discrete {
-        discrete: Mlp::new(
-            layout,
-            "discrete",
-            shape.len(),
-            &sizes.discrete,
-            choices,
-            ACTOR_GAIN,
-        ),
+        discrete: Mlp::new(layout, "discrete", shape.len(), &sizes.discrete, choices, ACTOR_GAIN),
         critic: Mlp::new(layout, "critic", shape.len(), &sizes.critic, 1, 1.0),
     }
 }

@@ -46,16 +46,9 @@ struct EncoderLayer {
 impl Transformer {
     /// Declares the encoder's tensors.
     pub fn new(layout: &mut Layout, name: &str, size: TransformerSize) -> Transformer {
-        let embed = Linear::new(
-            layout,
-            &format!("{name}.embed"),
-            size.features,
-            size.dim,
-            1.0,
-        );
-        let layers = (0..size.layers)
-            .map(|index| EncoderLayer::new(layout, &format!("{name}.layer{index}"), size))
-            .collect();
+        let embed = Linear::new(layout, &format!("{name}.embed"), size.features, size.dim, 1.0);
+        let layers =
+            (0..size.layers).map(|index| EncoderLayer::new(layout, &format!("{name}.layer{index}"), size)).collect();
         Transformer {
             embed,
             layers,
@@ -107,9 +100,7 @@ impl EncoderLayer {
         let width = dim / self.heads;
         let joined = self.query_key_value.forward(parameters, x);
         // [3, batch, heads, tokens, width]
-        let split = joined
-            .view([batch, tokens, 3, self.heads, width])
-            .permute([2, 0, 3, 1, 4]);
+        let split = joined.view([batch, tokens, 3, self.heads, width]).permute([2, 0, 3, 1, 4]);
         let (query, key, value) = (split.get(0), split.get(1), split.get(2));
         let scores = (query * (1.0 / (width as f64).sqrt())).matmul(&key.transpose(-2, -1));
         let scores = match padding {
@@ -127,16 +118,11 @@ fn positions(tokens: usize, dim: usize) -> Vec<f32> {
     let value = |token: usize, index: usize| {
         let rate = 10000f64.powf(-((index / 2 * 2) as f64) / dim as f64);
         let angle = token as f64 * rate;
-        let value = if index.is_multiple_of(2) {
-            angle.sin()
-        } else {
-            angle.cos()
-        };
+        let value = if index.is_multiple_of(2) { angle.sin() } else { angle.cos() };
         value as f32
     };
     let rows = 0..tokens;
-    rows.flat_map(|token| (0..dim).map(move |index| value(token, index)))
-        .collect()
+    rows.flat_map(|token| (0..dim).map(move |index| value(token, index))).collect()
 }
 
 #[cfg(test)]
