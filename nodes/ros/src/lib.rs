@@ -1,1 +1,69 @@
-//! .
+//! ROS 2 conventions on top of RustDDS: nodes, names, parameters, quality of service, the node graph, topics and services.
+//!
+//! A process is one [`Node`]. Its endpoints come from the table in [`graph`]; a thread of its own
+//! takes from its subscriptions until they have nothing and then waits:
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use swath_ros::{Node, RosArgs, Shutdown, graph};
+//!
+//! fn main() -> Result<(), swath_ros::RosError> {
+//!     let (_own_words, args) = RosArgs::split(std::env::args())?;
+//!     let node = Node::start(graph::GUIDANCE, &args)?;
+//!     let shutdown = Shutdown::on_signals(node.signal())?;
+//!     let states = node.subscription(&graph::SPACECRAFT_STATE)?;
+//!     let torques = node.publisher(&graph::WHEEL_TORQUE)?;
+//!     node.parameters().check_given()?;
+//!     node.wait_for_peers(&[graph::SPACECRAFT], Duration::from_secs(10))?;
+//!     while !shutdown.asked() {
+//!         while let Some(state) = states.take()? {
+//!             torques.publish(&swath_msgs::swath_msgs::WheelTorque {
+//!                 tick: state.tick,
+//!                 ..Default::default()
+//!             })?;
+//!         }
+//!         node.wait(Duration::from_millis(100))?;
+//!     }
+//!     Ok(())
+//! }
+//! ```
+//!
+//! RustDDS is used directly where `ros2-client` has no way: endpoints of raw CDR bytes that show
+//! in the ROS graph, parameter services with the mapping of rmw_cyclonedds, and waiting without
+//! an asynchronous executor.
+
+mod background;
+mod cli;
+mod clock;
+mod endpoint;
+mod environment;
+mod error;
+pub mod graph;
+mod logging;
+mod message;
+mod names;
+mod node;
+mod param_services;
+mod params;
+pub mod qos;
+mod roster;
+mod service;
+mod shutdown;
+mod signal;
+mod topic;
+mod value;
+
+pub use cli::RosArgs;
+pub use clock::{SimClock, stamp};
+pub use endpoint::{Cdr, Gid, HEADER_LENGTH, RawPublisher, RawSample, RawSubscription, SampleInfo};
+pub use environment::Environment;
+pub use error::RosError;
+pub use message::{decode, encode};
+pub use names::Names;
+pub use node::Node;
+pub use params::{Parameters, Spec};
+pub use service::{Client, Mapping, RequestId, Server};
+pub use shutdown::Shutdown;
+pub use signal::Signal;
+pub use topic::{Publisher, Sample, Subscription};
+pub use value::{Typed, Value};

@@ -1,0 +1,393 @@
+//! Writers and readers of CDR bytes: what recorder and player use, and what typed topics are made of.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex};
+use std::task::Waker;
+use std::time::Duration;
+
+use rustdds::bytes::Bytes;
+use rustdds::no_key::{
+    DataWriter, Decode, DefaultDecoder, DeserializedCacheChange, DeserializerAdapter,
+    SerializerAdapter, SimpleDataReader,
+};
+use rustdds::{
+    GUID, RTPSEntity as _, RepresentationIdentifier, SampleIdentity, Timestamp, WriteOptionsBuilder,
+};
+
+use crate::error::RosError;
+use crate::roster::{Direction, Roster};
+use crate::signal::{Signal, lock};
+
+/// A message as it travels: four bytes that name the encoding, then the encoded message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cdr {
+    bytes: Bytes,
+}
+
+/// Bytes of the encapsulation header.
+pub const HEADER_LENGTH: usize = 4;
+
+const LITTLE_ENDIAN: [u8; HEADER_LENGTH] = [0, 1, 0, 0];
+const BIG_ENDIAN: [u8; HEADER_LENGTH] = [0, 0, 0, 0];
+
+impl Cdr {
+    /// The bytes, header included, as bags store them.
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Takes bytes, header included.
+    pub fn from_bytes(bytes: impl Into<Bytes>) -> Self {
+        Self {
+            bytes: bytes.into(),
+        }
+    }
+
+    /// The bytes after the header, if they are little-endian plain CDR.
+    pub(crate) fn little_endian(&self) -> Option<&[u8]> {
+        self.bytes
+            .strip_prefix(&LITTLE_ENDIAN[..2])
+            .and_then(|rest| rest.get(2..))
+    }
+
+    /// The bytes after the header, if they are big-endian plain CDR.
+    pub(crate) fn big_endian(&self) -> Option<&[u8]> {
+        self.bytes
+            .strip_prefix(&BIG_ENDIAN[..2])
+            .and_then(|rest| rest.get(2..))
+    }
+}
+
+/// Starts a little-endian message with room for a payload of the given length.
+pub(crate) fn header_with_room(payload: usize) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER_LENGTH + payload);
+    bytes.extend_from_slice(&LITTLE_ENDIAN);
+    bytes
+}
+
+/// Identity of a writer or reader: 12 bytes of its process, 4 of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Gid(pub [u8; 16]);
+
+impl From<GUID> for Gid {
+    fn from(guid: GUID) -> Self {
+        Self(guid.to_bytes())
+    }
+}
+
+/// What comes with a sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleInfo {
+    /// When the writer sent it [ns since 1970], if it says so.
+    pub source_time_ns: Option<u64>,
+    /// When it came in [ns since 1970].
+    pub received_time_ns: u64,
+    /// The writer.
+    pub writer: Gid,
+    /// Number of the sample among those of its writer, from 1.
+    pub sequence_number: i64,
+    pub(crate) related: Option<SampleIdentity>,
+}
+
+/// A message of CDR bytes with what came with it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawSample {
+    /// The message.
+    pub cdr: Cdr,
+    /// What came with it.
+    pub info: SampleInfo,
+}
+
+/// The link between RustDDS and [`Cdr`].
+pub(crate) struct Adapter;
+
+impl DeserializerAdapter<Cdr> for Adapter {
+    type Error = Infallible;
+    type Decoded = Cdr;
+
+    fn supported_encodings() -> &'static [RepresentationIdentifier] {
+        &[
+            RepresentationIdentifier::CDR_LE,
+            RepresentationIdentifier::CDR_BE,
+            RepresentationIdentifier::XCDR2_LE,
+            RepresentationIdentifier::XCDR2_BE,
+            RepresentationIdentifier::D_CDR2_LE,
+            RepresentationIdentifier::D_CDR2_BE,
+        ]
+    }
+
+    fn transform_decoded(decoded: Cdr) -> Cdr {
+        decoded
+    }
+}
+
+#[derive(Clone)]
+pub(crate) struct Copier;
+
+impl Decode<'_, Cdr> for Copier {
+    type Error = Infallible;
+
+    fn decode_bytes(
+        self,
+        payload: &[u8],
+        encoding: RepresentationIdentifier,
+    ) -> Result<Cdr, Infallible> {
+        let [first, second] = encoding.to_bytes();
+        let mut bytes = Vec::with_capacity(HEADER_LENGTH + payload.len());
+        bytes.extend_from_slice(&[first, second, 0, 0]);
+        bytes.extend_from_slice(payload);
+        Ok(Cdr {
+            bytes: bytes.into(),
+        })
+    }
+}
+
+impl DefaultDecoder<Cdr> for Adapter {
+    type Decoder = Copier;
+    const DECODER: Copier = Copier;
+}
+
+impl SerializerAdapter<Cdr> for Adapter {
+    type Error = Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(cdr: &Cdr) -> Result<Bytes, Infallible> {
+        Ok(cdr.bytes.slice(HEADER_LENGTH.min(cdr.bytes.len())..))
+    }
+}
+
+/// Writes CDR bytes to a topic.
+pub struct RawPublisher {
+    pub(crate) writer: DataWriter<Cdr, Adapter>,
+    pub(crate) topic: String,
+    pub(crate) roster: Arc<Roster>,
+}
+
+impl RawPublisher {
+    /// Sends a message of little-endian CDR bytes, encapsulation header included.
+    ///
+    /// # Errors
+    /// If the bytes are encoded in another way, or a reader has been lagging for
+    /// [`crate::qos::SEND_TIMEOUT`].
+    pub fn publish(&self, cdr: Cdr) -> Result<(), RosError> {
+        self.send(cdr, None).map(|_| ())
+    }
+
+    pub(crate) fn send(
+        &self,
+        cdr: Cdr,
+        related: Option<SampleIdentity>,
+    ) -> Result<SampleIdentity, RosError> {
+        if cdr.little_endian().is_none() {
+            return Err(RosError::Send {
+                topic: self.topic.clone(),
+                reason: "only little-endian CDR can be sent".to_owned(),
+            });
+        }
+        let mut options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
+        if let Some(related) = related {
+            options = options.related_sample_identity(related);
+        }
+        self.writer
+            .write_with_options(cdr, options.build())
+            .map_err(|error| RosError::Send {
+                topic: self.topic.clone(),
+                reason: error.to_string(),
+            })
+    }
+
+    /// Waits until every reliable reader has all samples, and tells whether that is so.
+    pub fn flush(&self, timeout: Duration) -> bool {
+        self.writer
+            .wait_for_acknowledgments(timeout)
+            .unwrap_or(false)
+    }
+
+    /// Readers that this writer sends to.
+    pub fn matched(&self) -> usize {
+        self.roster.matched(self.writer.guid().into()).len()
+    }
+
+    /// Fully qualified name of the topic.
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// The writer's identity.
+    pub fn gid(&self) -> Gid {
+        self.writer.guid().into()
+    }
+}
+
+impl Drop for RawPublisher {
+    fn drop(&mut self) {
+        self.roster.withdraw(Direction::Write, self.gid());
+    }
+}
+
+/// Reads CDR bytes from a topic.
+pub struct RawSubscription {
+    reader: SimpleDataReader<Cdr, Adapter>,
+    topic: String,
+    roster: Arc<Roster>,
+    waker: Waker,
+    losses: Mutex<Losses>,
+}
+
+impl RawSubscription {
+    pub(crate) fn new(
+        reader: SimpleDataReader<Cdr, Adapter>,
+        topic: String,
+        roster: Arc<Roster>,
+        signal: &Signal,
+    ) -> Self {
+        Self {
+            reader,
+            topic,
+            roster,
+            waker: signal.waker(),
+            losses: Mutex::default(),
+        }
+    }
+
+    /// The next sample, if there is one.
+    ///
+    /// Once it has returned nothing, the next sample to come raises the node's [`Signal`].
+    pub fn take(&self) -> Result<Option<RawSample>, RosError> {
+        if let Some(sample) = self.try_take()? {
+            return Ok(Some(sample));
+        }
+        // A sample may have come before the waker was set: look again.
+        self.reader.set_waker(Some(self.waker.clone()));
+        self.try_take()
+    }
+
+    fn try_take(&self) -> Result<Option<RawSample>, RosError> {
+        let sample = self
+            .reader
+            .try_take_one()
+            .map_err(|error| RosError::Receive {
+                topic: self.topic.clone(),
+                reason: error.to_string(),
+            })?;
+        Ok(sample.map(|change| {
+            let sample = raw_sample(change);
+            lock(&self.losses).note(&sample.info);
+            sample
+        }))
+    }
+
+    /// From now on this subscription raises that signal and no longer the node's.
+    pub fn set_signal(&mut self, signal: &Signal) {
+        self.waker = signal.waker();
+        signal.raise();
+    }
+
+    /// Samples that were sent but never taken: too many came before they were taken.
+    pub fn lost(&self) -> u64 {
+        lock(&self.losses).lost
+    }
+
+    /// Writers that this reader receives from.
+    pub fn matched(&self) -> usize {
+        self.roster.matched(self.reader.guid().into()).len()
+    }
+
+    /// Fully qualified name of the topic.
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// The reader's identity.
+    pub fn gid(&self) -> Gid {
+        self.reader.guid().into()
+    }
+}
+
+impl Drop for RawSubscription {
+    fn drop(&mut self) {
+        self.roster.withdraw(Direction::Read, self.gid());
+    }
+}
+
+/// Counts gaps in the numbers of each writer's samples.
+#[derive(Default)]
+struct Losses {
+    last: BTreeMap<Gid, i64>,
+    lost: u64,
+}
+
+impl Losses {
+    fn note(&mut self, info: &SampleInfo) {
+        if let Some(last) = self.last.insert(info.writer, info.sequence_number) {
+            self.lost += u64::try_from(info.sequence_number - last - 1).unwrap_or(0);
+        }
+    }
+}
+
+fn raw_sample(change: DeserializedCacheChange<Cdr>) -> RawSample {
+    let info = SampleInfo {
+        source_time_ns: change.source_timestamp().map(nanoseconds),
+        received_time_ns: nanoseconds(change.receive_instant),
+        writer: change.writer_guid().into(),
+        sequence_number: change.sequence_number.into(),
+        related: change.related_sample_identity(),
+    };
+    RawSample {
+        cdr: change.into_value(),
+        info,
+    }
+}
+
+/// Nanoseconds since 1970 of a time that DDS counts in 2^-32 s.
+fn nanoseconds(time: Timestamp) -> u64 {
+    let ticks = time.to_ticks();
+    let (seconds, fraction) = (ticks >> 32, ticks & 0xffff_ffff);
+    seconds * 1_000_000_000 + ((fraction * 1_000_000_000 + (1 << 31)) >> 32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_exact_to_the_nanosecond() {
+        assert_eq!(nanoseconds(Timestamp::from_ticks(1 << 32)), 1_000_000_000);
+        assert_eq!(
+            nanoseconds(Timestamp::from_ticks((5 << 32) + (1 << 31))),
+            5_500_000_000
+        );
+        // 2^-32 s is 0.23 ns: every nanosecond has a tick of its own.
+        let one_ns = ((1_u64 << 32) / 1_000_000_000) + 1;
+        assert_eq!(nanoseconds(Timestamp::from_ticks(one_ns)), 1);
+    }
+
+    #[test]
+    fn gaps_are_counted_per_writer() {
+        let info = |writer: u8, sequence_number| SampleInfo {
+            source_time_ns: None,
+            received_time_ns: 0,
+            writer: Gid([writer; 16]),
+            sequence_number,
+            related: None,
+        };
+        let mut losses = Losses::default();
+        for (writer, number) in [(1, 10), (2, 1), (1, 11), (2, 4), (1, 13)] {
+            losses.note(&info(writer, number));
+        }
+        assert_eq!(losses.lost, 3);
+    }
+
+    #[test]
+    fn only_plain_cdr_has_a_byte_order() {
+        let cdr = |bytes: &'static [u8]| Cdr::from_bytes(bytes);
+        assert_eq!(cdr(&[0, 1, 0, 0, 7]).little_endian(), Some(&[7][..]));
+        assert_eq!(cdr(&[0, 0, 0, 0, 7]).big_endian(), Some(&[7][..]));
+        assert_eq!(cdr(&[0, 7, 0, 0, 7]).little_endian(), None);
+        assert_eq!(cdr(&[0, 1]).little_endian(), None);
+    }
+}

@@ -1,0 +1,350 @@
+//! The node graph: the one table of who writes and who reads which topic, with which type and profile.
+//!
+//! Nodes make their endpoints from these entries, the recorder takes its topics from [`TOPICS`],
+//! and the README shows [`mermaid`].
+
+use std::fmt::Write as _;
+use std::marker::PhantomData;
+
+use swath_msgs::diagnostic_msgs::DiagnosticArray;
+use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_msgs::sensor_msgs::{JointState, NavSatFix};
+use swath_msgs::swath_msgs::{
+    Decision, DecisionPoint, GuidanceStatus, ImagingTask, RequestSummary, SpacecraftState,
+    StripRequest, StripStatus, SubmitStrips, UpcomingStrips, WheelTorque,
+};
+use swath_msgs::tf2_msgs::TFMessage;
+use swath_msgs::{RosMessage, RosService};
+
+use crate::qos::Profile;
+
+/// The namespace that nodes are in when nobody says otherwise.
+pub const NAMESPACE: &str = "/swath";
+
+/// Integrates the dynamics and owns the clock.
+pub const SPACECRAFT: &str = "spacecraft";
+/// Flies the task in hand.
+pub const GUIDANCE: &str = "guidance";
+/// Keeps every strip that was ever requested.
+pub const REQUEST_MANAGER: &str = "request_manager";
+/// Chooses the next task.
+pub const PLANNER: &str = "planner";
+/// Starts and watches the others.
+pub const LAUNCHER: &str = "launcher";
+/// Writes every topic to a bag.
+pub const RECORDER: &str = "recorder";
+/// Publishes the topics of a bag.
+pub const PLAYER: &str = "player";
+/// A person's command line or another program.
+pub const OPERATOR: &str = "operator";
+
+/// The nodes that fly a mission.
+pub const FLIGHT_NODES: [&str; 4] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER];
+
+/// What the table says of a topic or service.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Name, relative to the namespace unless it starts with a slash.
+    pub name: &'static str,
+    /// Full name of the type, such as `std_msgs/msg/Header`.
+    pub type_name: &'static str,
+    /// Quality of service.
+    pub profile: Profile,
+    /// Nodes that write it, or serve it.
+    pub writers: &'static [&'static str],
+    /// Nodes that read it, or call it; the recorder reads every topic besides.
+    pub readers: &'static [&'static str],
+}
+
+/// A topic of the table.
+pub struct Topic<M> {
+    /// What the table says.
+    pub entry: Entry,
+    message: PhantomData<fn() -> M>,
+}
+
+/// A service of the table.
+pub struct Service<S> {
+    /// What the table says.
+    pub entry: Entry,
+    service: PhantomData<fn() -> S>,
+}
+
+impl<M: RosMessage> Topic<M> {
+    /// A topic that is not in the table, such as one of a test.
+    pub const fn new(
+        name: &'static str,
+        profile: Profile,
+        writers: &'static [&'static str],
+        readers: &'static [&'static str],
+    ) -> Self {
+        let entry = Entry {
+            name,
+            type_name: M::TYPE_NAME,
+            profile,
+            writers,
+            readers,
+        };
+        Self {
+            entry,
+            message: PhantomData,
+        }
+    }
+}
+
+impl<S: RosService> Service<S> {
+    /// A service that is not in the table, such as one of a test.
+    pub const fn new(
+        name: &'static str,
+        writers: &'static [&'static str],
+        readers: &'static [&'static str],
+    ) -> Self {
+        let profile = Profile::Service;
+        let entry = Entry {
+            name,
+            type_name: S::TYPE_NAME,
+            profile,
+            writers,
+            readers,
+        };
+        Self {
+            entry,
+            service: PhantomData,
+        }
+    }
+}
+
+/// Simulated time.
+pub const CLOCK: Topic<Clock> = Topic::new("/clock", Profile::Clock, &[SPACECRAFT], &[]);
+/// State of the spacecraft, each tick.
+pub const SPACECRAFT_STATE: Topic<SpacecraftState> = Topic::new(
+    "spacecraft/state",
+    Profile::State,
+    &[SPACECRAFT],
+    &[GUIDANCE],
+);
+/// Torque command, each tick.
+pub const WHEEL_TORQUE: Topic<WheelTorque> = Topic::new(
+    "guidance/wheel_torque",
+    Profile::State,
+    &[GUIDANCE],
+    &[SPACECRAFT],
+);
+/// A task is wanted.
+pub const DECISION_POINT: Topic<DecisionPoint> = Topic::new(
+    "guidance/decision_point",
+    Profile::Command,
+    &[GUIDANCE],
+    &[REQUEST_MANAGER, PLANNER, LAUNCHER],
+);
+/// What guidance is doing, every ten seconds.
+pub const GUIDANCE_STATUS: Topic<GuidanceStatus> =
+    Topic::new("guidance/status", Profile::Event, &[GUIDANCE], &[LAUNCHER]);
+/// The next task.
+pub const PLANNER_TASK: Topic<ImagingTask> = Topic::new(
+    "planner/task",
+    Profile::Command,
+    &[PLANNER],
+    &[GUIDANCE, REQUEST_MANAGER],
+);
+/// How the task was chosen.
+pub const PLANNER_DECISION: Topic<Decision> =
+    Topic::new("planner/decision", Profile::Event, &[PLANNER], &[LAUNCHER]);
+/// The strips to choose among.
+pub const UPCOMING_STRIPS: Topic<UpcomingStrips> = Topic::new(
+    "requests/upcoming",
+    Profile::Latched,
+    &[REQUEST_MANAGER],
+    &[PLANNER],
+);
+/// A strip request from anyone, without an answer.
+pub const STRIP_REQUEST: Topic<StripRequest> = Topic::new(
+    "requests/request",
+    Profile::Event,
+    &[OPERATOR],
+    &[REQUEST_MANAGER],
+);
+/// Changes of strip requests.
+pub const STRIP_EVENTS: Topic<StripStatus> = Topic::new(
+    "requests/events",
+    Profile::Event,
+    &[REQUEST_MANAGER],
+    &[OPERATOR],
+);
+/// How many strip requests are in which state.
+pub const REQUEST_SUMMARY: Topic<RequestSummary> = Topic::new(
+    "requests/summary",
+    Profile::Latched,
+    &[REQUEST_MANAGER],
+    &[LAUNCHER, OPERATOR],
+);
+/// Point on the ground below the satellite, decimated.
+pub const SUB_SATELLITE_POINT: Topic<NavSatFix> = Topic::new(
+    "spacecraft/sub_satellite_point",
+    Profile::Event,
+    &[SPACECRAFT],
+    &[],
+);
+/// Speeds and torques of the wheels, decimated.
+pub const WHEELS: Topic<JointState> =
+    Topic::new("spacecraft/wheels", Profile::Event, &[SPACECRAFT], &[]);
+/// Frames, decimated.
+pub const TF: Topic<TFMessage> = Topic::new("/tf", Profile::Event, &[SPACECRAFT], &[]);
+/// Health of the nodes.
+pub const DIAGNOSTICS: Topic<DiagnosticArray> =
+    Topic::new("/diagnostics", Profile::Event, &FLIGHT_NODES, &[LAUNCHER]);
+/// Log lines of the nodes.
+pub const ROSOUT: Topic<Log> = Topic::new("/rosout", Profile::Log, &FLIGHT_NODES, &[]);
+/// Changes of parameters.
+pub const PARAMETER_EVENTS: Topic<ParameterEvent> =
+    Topic::new("/parameter_events", Profile::Event, &FLIGHT_NODES, &[]);
+
+/// Submits strip requests, with an answer for each.
+pub const SUBMIT_STRIPS: Service<SubmitStrips> =
+    Service::new("requests/submit", &[REQUEST_MANAGER], &[OPERATOR]);
+
+/// Every topic of the table; the recorder records these.
+pub const TOPICS: &[Entry] = &[
+    CLOCK.entry,
+    SPACECRAFT_STATE.entry,
+    SUB_SATELLITE_POINT.entry,
+    WHEELS.entry,
+    TF.entry,
+    WHEEL_TORQUE.entry,
+    DECISION_POINT.entry,
+    GUIDANCE_STATUS.entry,
+    UPCOMING_STRIPS.entry,
+    STRIP_REQUEST.entry,
+    STRIP_EVENTS.entry,
+    REQUEST_SUMMARY.entry,
+    PLANNER_TASK.entry,
+    PLANNER_DECISION.entry,
+    DIAGNOSTICS.entry,
+    ROSOUT.entry,
+    PARAMETER_EVENTS.entry,
+];
+
+/// Every service of the table; those for parameters, which each node has, are not listed.
+pub const SERVICES: &[Entry] = &[SUBMIT_STRIPS.entry];
+
+/// The table as a Mermaid flow chart: nodes are boxes, topics are arrows between them.
+pub fn mermaid() -> String {
+    let mut chart = "flowchart LR\n".to_owned();
+    for node in FLIGHT_NODES.iter().chain(&[LAUNCHER, OPERATOR, RECORDER]) {
+        let _ = writeln!(chart, "    {node}[{node}]");
+    }
+    for (entries, arrow) in [(TOPICS, "-->"), (SERVICES, "<-.->")] {
+        for entry in entries {
+            let ends = |entry: &Entry| (entry.writers.len(), entry.readers.len());
+            if ends(entry).0 > 1 || ends(entry).1 == 0 {
+                continue;
+            }
+            for (writer, reader) in pairs(entry) {
+                let (from, to) = if arrow == "-->" {
+                    (writer, reader)
+                } else {
+                    (reader, writer)
+                };
+                let _ = writeln!(chart, "    {from} {arrow}|{}| {to}", entry.name);
+            }
+        }
+    }
+    let _ = writeln!(chart, "    FLIGHT([every topic]) --> {RECORDER}");
+    chart
+}
+
+fn pairs(entry: &Entry) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let (writers, readers) = (entry.writers, entry.readers);
+    writers
+        .iter()
+        .flat_map(move |writer| readers.iter().map(move |reader| (*writer, *reader)))
+}
+
+/// The table in Markdown.
+pub fn table() -> String {
+    let mut table =
+        "| topic | type | profile | written by | read by |\n| --- | --- | --- | --- | --- |\n"
+            .to_owned();
+    for entry in TOPICS.iter().chain(SERVICES) {
+        let list = |nodes: &[&str]| {
+            if nodes.is_empty() {
+                "any".to_owned()
+            } else {
+                nodes.join(", ")
+            }
+        };
+        let _ = writeln!(
+            table,
+            "| `{}` | `{}` | {} | {} | {} |",
+            entry.name,
+            entry.type_name,
+            entry.profile.name(),
+            list(entry.writers),
+            list(entry.readers)
+        );
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_topic_is_in_the_table_once_and_has_a_schema() {
+        let mut names: Vec<_> = TOPICS
+            .iter()
+            .chain(SERVICES)
+            .map(|entry| entry.name)
+            .collect();
+        names.sort_unstable();
+        let count = names.len();
+        names.dedup();
+        assert_eq!(names.len(), count);
+        for entry in TOPICS {
+            assert!(
+                swath_msgs::schema_for(entry.type_name).is_some(),
+                "{}",
+                entry.name
+            );
+            assert!(!entry.writers.is_empty(), "{}", entry.name);
+        }
+    }
+
+    #[test]
+    fn the_control_loop_has_only_its_two_ends() {
+        assert_eq!(SPACECRAFT_STATE.entry.readers, [GUIDANCE]);
+        assert_eq!(WHEEL_TORQUE.entry.readers, [SPACECRAFT]);
+    }
+
+    #[test]
+    fn the_diagram_shows_the_flow() {
+        let expected = "flowchart LR
+    spacecraft[spacecraft]
+    guidance[guidance]
+    request_manager[request_manager]
+    planner[planner]
+    launcher[launcher]
+    operator[operator]
+    recorder[recorder]
+    spacecraft -->|spacecraft/state| guidance
+    guidance -->|guidance/wheel_torque| spacecraft
+    guidance -->|guidance/decision_point| request_manager
+    guidance -->|guidance/decision_point| planner
+    guidance -->|guidance/decision_point| launcher
+    guidance -->|guidance/status| launcher
+    request_manager -->|requests/upcoming| planner
+    operator -->|requests/request| request_manager
+    request_manager -->|requests/events| operator
+    request_manager -->|requests/summary| launcher
+    request_manager -->|requests/summary| operator
+    planner -->|planner/task| guidance
+    planner -->|planner/task| request_manager
+    planner -->|planner/decision| launcher
+    operator <-.->|requests/submit| request_manager
+    FLIGHT([every topic]) --> recorder
+";
+        assert_eq!(mermaid(), expected);
+    }
+}

@@ -1,0 +1,503 @@
+//! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use rustdds::{
+    DomainParticipant, DomainParticipantBuilder, Publisher as DdsPublisher, QosPolicies,
+    RTPSEntity as _, Subscriber as DdsSubscriber, TopicKind,
+};
+use swath_msgs::{RosMessage, RosService};
+
+use crate::background::Background;
+use crate::cli::RosArgs;
+use crate::clock::SimClock;
+use crate::endpoint::{Adapter, Cdr, Gid, RawPublisher, RawSubscription};
+use crate::environment::Environment;
+use crate::error::RosError;
+use crate::graph::{self, Entry};
+use crate::logging;
+use crate::names::{Names, dds_service, dds_topic, dds_type};
+use crate::param_services::ParameterServices;
+use crate::params::{Parameters, Spec};
+use crate::qos::{Profile, QosProfile, policies, with_depth};
+use crate::roster::{Direction, Roster};
+use crate::service::{Client, Server};
+use crate::signal::{Signal, lock};
+use crate::topic::{Publisher, Subscription};
+
+/// How long a new node listens for another one of its name before it shows itself.
+const LISTENING: Duration = Duration::from_millis(600);
+
+/// How long after a match the other side may still not send or receive.
+const SETTLING: Duration = Duration::from_millis(300);
+
+const ANNOUNCEMENTS: &str = "ros_discovery_info";
+const ANNOUNCEMENT_TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
+
+/// A ROS 2 node.
+///
+/// Drop its publishers, subscriptions, servers and clients before the node itself.
+pub struct Node {
+    // Fields are dropped in this order: the thread first, the participant last.
+    background: Background,
+    endpoints: Mutex<Vec<(Direction, Gid, Entry)>>,
+    roster: Arc<Roster>,
+    parameters: Parameters,
+    clock: SimClock,
+    signal: Signal,
+    names: Names,
+    environment: Environment,
+    dds: Dds,
+}
+
+/// What endpoints are made with.
+struct Dds {
+    publisher: DdsPublisher,
+    subscriber: DdsSubscriber,
+    participant: DomainParticipant,
+}
+
+impl Node {
+    /// Starts the node that the table calls `name`, in the domain and network that the environment
+    /// says, with its log on stderr and on `/rosout`.
+    ///
+    /// # Errors
+    /// If another node of this name runs in the domain, or DDS cannot be used.
+    pub fn start(name: &str, args: &RosArgs) -> Result<Self, RosError> {
+        Self::start_in(Environment::read()?, name, args)
+    }
+
+    /// As [`Self::start`], in an environment of the caller's choice.
+    pub fn start_in(
+        environment: Environment,
+        name: &str,
+        args: &RosArgs,
+    ) -> Result<Self, RosError> {
+        let names = args.names(graph::NAMESPACE, name)?;
+        let dds = Dds::new(&environment)?;
+        let signal = Signal::new();
+        let qos = Profile::Latched.qos();
+        let own = Gid::from(dds.participant.guid());
+        let dds_type = dds_type(ANNOUNCEMENT_TYPE)?;
+        let announcer = dds.writer(ANNOUNCEMENTS, &dds_type, &qos)?;
+        let roster = Arc::new(Roster::new(own, names.clone(), announcer));
+        let announcements = RawSubscription::new(
+            dds.reader(ANNOUNCEMENTS, &dds_type, &with_depth(qos, 256))?,
+            ANNOUNCEMENTS.to_owned(),
+            Arc::clone(&roster),
+            &signal,
+        );
+        let background = Background::start(
+            &dds.participant,
+            Arc::clone(&roster),
+            announcements,
+            signal.clone(),
+        )?;
+        let node = Self {
+            background,
+            endpoints: Mutex::default(),
+            roster,
+            parameters: Parameters::new(args, &names),
+            clock: SimClock::default(),
+            signal,
+            names,
+            environment,
+            dds,
+        };
+        node.come_up(args)?;
+        Ok(node)
+    }
+
+    fn come_up(&self, args: &RosArgs) -> Result<(), RosError> {
+        if self.roster.wait_until(Instant::now() + LISTENING, || {
+            self.roster.namesake().is_some()
+        }) {
+            return Err(self.duplicate());
+        }
+        self.roster.announce();
+        let rosout = match args.rosout() {
+            true => Some(Arc::new(self.publisher(&graph::ROSOUT)?)),
+            false => None,
+        };
+        let logger = self
+            .names
+            .fully_qualified()
+            .trim_start_matches('/')
+            .replace('/', ".");
+        logging::install(
+            logger,
+            args.log_level_of(&self.names),
+            self.clock.clone(),
+            rosout,
+        );
+        let use_sim_time = Spec::new(
+            "use_sim_time",
+            true,
+            "Stamps and timers follow simulated time; there is no other here.",
+        );
+        self.parameters.declare(use_sim_time.read_only())?;
+        self.background.serve(self.parameter_services()?);
+        Ok(())
+    }
+
+    fn parameter_services(&self) -> Result<ParameterServices, RosError> {
+        Ok(ParameterServices {
+            node: self.names.fully_qualified(),
+            parameters: self.parameters.clone(),
+            clock: self.clock.clone(),
+            describe: self.server(&graph::Service::new("~/describe_parameters", &[], &[]))?,
+            get: self.server(&graph::Service::new("~/get_parameters", &[], &[]))?,
+            get_types: self.server(&graph::Service::new("~/get_parameter_types", &[], &[]))?,
+            list: self.server(&graph::Service::new("~/list_parameters", &[], &[]))?,
+            set: self.server(&graph::Service::new("~/set_parameters", &[], &[]))?,
+            set_atomically: self.server(&graph::Service::new(
+                "~/set_parameters_atomically",
+                &[],
+                &[],
+            ))?,
+            events: self.publisher(&graph::PARAMETER_EVENTS)?,
+        })
+    }
+
+    /// A writer of a topic.
+    pub fn publisher<M: RosMessage>(
+        &self,
+        topic: &graph::Topic<M>,
+    ) -> Result<Publisher<M>, RosError> {
+        let Entry {
+            name,
+            type_name,
+            profile,
+            ..
+        } = topic.entry;
+        let raw = self.raw_publisher(name, type_name, &profile.qos())?;
+        self.remember(Direction::Write, raw.gid(), topic.entry);
+        Ok(Publisher::new(raw))
+    }
+
+    /// A reader of a topic, with the depth of the topic's profile.
+    pub fn subscription<M: RosMessage>(
+        &self,
+        topic: &graph::Topic<M>,
+    ) -> Result<Subscription<M>, RosError> {
+        self.subscription_with_depth(topic, topic.entry.profile.depth())
+    }
+
+    /// A reader that keeps up to `depth` messages until they are taken.
+    pub fn subscription_with_depth<M: RosMessage>(
+        &self,
+        topic: &graph::Topic<M>,
+        depth: usize,
+    ) -> Result<Subscription<M>, RosError> {
+        let Entry {
+            name,
+            type_name,
+            profile,
+            ..
+        } = topic.entry;
+        let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
+        self.remember(Direction::Read, raw.gid(), topic.entry);
+        Ok(Subscription::new(raw))
+    }
+
+    /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type
+    /// `type_name` (such as `std_msgs/msg/Header`).
+    pub fn raw_publisher(
+        &self,
+        name: &str,
+        type_name: &str,
+        qos: &QosProfile,
+    ) -> Result<RawPublisher, RosError> {
+        let topic = self.names.resolve(name)?;
+        self.writer(
+            topic.clone(),
+            &dds_topic(&topic),
+            &dds_type(type_name)?,
+            qos,
+        )
+    }
+
+    /// A reader of CDR bytes from the topic `name` (relative, absolute or private) of the type
+    /// `type_name` (such as `std_msgs/msg/Header`).
+    pub fn raw_subscription(
+        &self,
+        name: &str,
+        type_name: &str,
+        qos: &QosProfile,
+    ) -> Result<RawSubscription, RosError> {
+        let topic = self.names.resolve(name)?;
+        self.reader(
+            topic.clone(),
+            &dds_topic(&topic),
+            &dds_type(type_name)?,
+            qos,
+        )
+    }
+
+    /// A server of a service.
+    pub fn server<S: RosService>(
+        &self,
+        service: &graph::Service<S>,
+    ) -> Result<Server<S>, RosError> {
+        let name = self.names.resolve(service.entry.name)?;
+        let (request_topic, response_topic) = dds_service(&name);
+        let qos = Profile::Service.qos();
+        let request_type = dds_type(S::Request::TYPE_NAME)?;
+        let response_type = dds_type(S::Response::TYPE_NAME)?;
+        let requests = self.reader(name.clone(), &request_topic, &request_type, &qos)?;
+        let responses = self.writer(name, &response_topic, &response_type, &qos)?;
+        Ok(Server::new(requests, responses, self.environment.mapping))
+    }
+
+    /// A client of a service.
+    pub fn client<S: RosService>(
+        &self,
+        service: &graph::Service<S>,
+    ) -> Result<Client<S>, RosError> {
+        let name = self.names.resolve(service.entry.name)?;
+        let (request_topic, response_topic) = dds_service(&name);
+        let qos = Profile::Service.qos();
+        let request_type = dds_type(S::Request::TYPE_NAME)?;
+        let response_type = dds_type(S::Response::TYPE_NAME)?;
+        let requests = self.writer(name.clone(), &request_topic, &request_type, &qos)?;
+        let responses = self.reader(name.clone(), &response_topic, &response_type, &qos)?;
+        Ok(Client::new(
+            name,
+            requests,
+            responses,
+            self.environment.mapping,
+        ))
+    }
+
+    fn writer(
+        &self,
+        topic: String,
+        dds_topic: &str,
+        dds_type: &str,
+        qos: &QosProfile,
+    ) -> Result<RawPublisher, RosError> {
+        let writer = self.dds.writer(dds_topic, dds_type, qos)?;
+        self.roster.enrol(Direction::Write, writer.guid().into());
+        Ok(RawPublisher {
+            writer,
+            topic,
+            roster: Arc::clone(&self.roster),
+        })
+    }
+
+    fn reader(
+        &self,
+        topic: String,
+        dds_topic: &str,
+        dds_type: &str,
+        qos: &QosProfile,
+    ) -> Result<RawSubscription, RosError> {
+        let reader = self.dds.reader(dds_topic, dds_type, qos)?;
+        self.roster.enrol(Direction::Read, reader.guid().into());
+        Ok(RawSubscription::new(
+            reader,
+            topic,
+            Arc::clone(&self.roster),
+            &self.signal,
+        ))
+    }
+
+    fn remember(&self, direction: Direction, gid: Gid, entry: Entry) {
+        lock(&self.endpoints).push((direction, gid, entry));
+    }
+
+    /// Waits for news on this node's subscriptions, and tells whether there are any.
+    ///
+    /// See [`Signal::wait`]: take from each subscription until it has nothing, then wait.
+    ///
+    /// # Errors
+    /// If this node has to go because another one has its name.
+    pub fn wait(&self, timeout: Duration) -> Result<bool, RosError> {
+        let news = self.signal.wait(timeout);
+        if self.background.must_yield() {
+            Err(self.duplicate())
+        } else {
+            Ok(news)
+        }
+    }
+
+    /// Waits until each of the nodes (as the table names them, in this namespace) is matched on
+    /// every topic that it and this node have in common by the table, in the right direction.
+    ///
+    /// # Errors
+    /// If that is not so when the time is over; the error names what is missing.
+    pub fn wait_for_peers(&self, nodes: &[&str], timeout: Duration) -> Result<(), RosError> {
+        let deadline = Instant::now() + timeout;
+        if !self
+            .roster
+            .wait_until(deadline, || self.missing(nodes).is_empty())
+        {
+            return Err(RosError::MissingPeers {
+                waited: timeout,
+                missing: self.missing(nodes),
+            });
+        }
+        std::thread::sleep(SETTLING);
+        Ok(())
+    }
+
+    /// Waits until a server of the client's service is there.
+    pub fn wait_for_service<S: RosService>(
+        &self,
+        client: &Client<S>,
+        timeout: Duration,
+    ) -> Result<(), RosError> {
+        if !self
+            .roster
+            .wait_until(Instant::now() + timeout, || client.matched())
+        {
+            let missing = vec![format!("nobody serves {}", client.service())];
+            return Err(RosError::MissingPeers {
+                waited: timeout,
+                missing,
+            });
+        }
+        std::thread::sleep(SETTLING);
+        Ok(())
+    }
+
+    fn missing(&self, nodes: &[&str]) -> Vec<String> {
+        let there = self.roster.nodes();
+        let namespace = self.names.namespace().trim_end_matches('/');
+        let mut missing = Vec::new();
+        for node in nodes {
+            let full = format!("{namespace}/{node}");
+            if !there.contains(&full) {
+                missing.push(format!("node {full} is not there"));
+                continue;
+            }
+            for (direction, gid, entry) in lock(&self.endpoints).iter() {
+                let (others, verb) = match direction {
+                    Direction::Write => (entry.readers, "read"),
+                    Direction::Read => (entry.writers, "write"),
+                };
+                if others.contains(node) && !self.roster.matched_nodes(*gid).contains(&full) {
+                    missing.push(format!("{full} does not {verb} {}", entry.name));
+                }
+            }
+        }
+        missing.extend(self.roster.refusals());
+        missing
+    }
+
+    /// Fully qualified names of the nodes of the other processes in the domain.
+    pub fn nodes(&self) -> BTreeSet<String> {
+        self.roster.nodes()
+    }
+
+    /// The parameters of this node.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Simulated time as this node knows it; the node's logic sets it.
+    pub fn clock(&self) -> &SimClock {
+        &self.clock
+    }
+
+    /// The signal that this node's subscriptions raise.
+    pub fn signal(&self) -> &Signal {
+        &self.signal
+    }
+
+    /// The names of this node.
+    pub fn names(&self) -> &Names {
+        &self.names
+    }
+
+    /// The DDS domain, network and middleware.
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
+    fn duplicate(&self) -> RosError {
+        RosError::DuplicateNode {
+            node: self.names.fully_qualified(),
+            domain: self.environment.domain,
+        }
+    }
+}
+
+impl Drop for Node {
+    fn drop(&mut self) {
+        self.roster.retire();
+    }
+}
+
+impl Dds {
+    fn new(environment: &Environment) -> Result<Self, RosError> {
+        let what = format!("a participant in domain {}", environment.domain);
+        let failed = |error: rustdds::dds::CreateError| create_error(&what, &error);
+        let mut builder = DomainParticipantBuilder::new(environment.domain);
+        if let Some(networks) = environment.networks() {
+            builder = builder.with_only_networks(networks);
+        }
+        let participant = builder.build().map_err(failed)?;
+        let none = QosPolicies::builder().build();
+        let publisher = participant.create_publisher(&none).map_err(failed)?;
+        let subscriber = participant.create_subscriber(&none).map_err(failed)?;
+        Ok(Self {
+            publisher,
+            subscriber,
+            participant,
+        })
+    }
+
+    fn writer(
+        &self,
+        topic: &str,
+        type_name: &str,
+        qos: &QosProfile,
+    ) -> Result<rustdds::no_key::DataWriter<Cdr, Adapter>, RosError> {
+        let what = format!("a writer of {topic}");
+        let policies = policies(qos);
+        let topic = self.topic(topic, type_name, &policies)?;
+        self.publisher
+            .create_datawriter_no_key(&topic, Some(policies))
+            .map_err(|error| create_error(&what, &error))
+    }
+
+    fn reader(
+        &self,
+        topic: &str,
+        type_name: &str,
+        qos: &QosProfile,
+    ) -> Result<rustdds::no_key::SimpleDataReader<Cdr, Adapter>, RosError> {
+        let what = format!("a reader of {topic}");
+        let policies = policies(qos);
+        let topic = self.topic(topic, type_name, &policies)?;
+        self.subscriber
+            .create_simple_datareader_no_key(&topic, Some(policies))
+            .map_err(|error| create_error(&what, &error))
+    }
+
+    fn topic(
+        &self,
+        name: &str,
+        type_name: &str,
+        policies: &QosPolicies,
+    ) -> Result<rustdds::Topic, RosError> {
+        self.participant
+            .create_topic(
+                name.to_owned(),
+                type_name.to_owned(),
+                policies,
+                TopicKind::NoKey,
+            )
+            .map_err(|error| create_error(&format!("the topic {name}"), &error))
+    }
+}
+
+fn create_error(what: &str, error: &rustdds::dds::CreateError) -> RosError {
+    RosError::Create {
+        what: what.to_owned(),
+        reason: error.to_string(),
+    }
+}

@@ -1,0 +1,374 @@
+//! Service servers and clients over a pair of topics.
+//!
+//! The middlewares of ROS 2 disagree on how a response names its request. [`Mapping::Cyclone`]
+//! puts the client and a number before the message; [`Mapping::Enhanced`] (Fast DDS, Connext) puts
+//! them into the DDS sample's header.
+
+use std::marker::PhantomData;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::{Duration, Instant};
+
+use rustdds::{GUID, SampleIdentity, SequenceNumber};
+use serde::{Deserialize, Serialize};
+use swath_msgs::{RosMessage, RosService};
+
+use crate::endpoint::{Cdr, RawPublisher, RawSample, RawSubscription};
+use crate::error::RosError;
+use crate::message::{decode, decode_as, encode, encode_as};
+use crate::signal::Signal;
+
+/// How requests and responses are told apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mapping {
+    /// As rmw_cyclonedds does it.
+    Cyclone,
+    /// As rmw_fastrtps and rmw_connextdds do it.
+    Enhanced,
+}
+
+impl Mapping {
+    /// The mapping that the nodes around use, by the value of `RMW_IMPLEMENTATION`.
+    pub fn for_middleware(rmw_implementation: Option<&str>) -> Self {
+        match rmw_implementation {
+            Some(name) if name.contains("fastrtps") || name.contains("connext") => Self::Enhanced,
+            _ => Self::Cyclone,
+        }
+    }
+}
+
+/// Names a request among all requests of all clients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RequestId {
+    client: [u8; 16],
+    number: i64,
+}
+
+/// A message with the header that [`Mapping::Cyclone`] puts before it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Framed<M> {
+    /// The second half of the client's identity.
+    client: [u8; 8],
+    number: i64,
+    message: M,
+}
+
+impl RequestId {
+    fn of(identity: SampleIdentity) -> Self {
+        Self {
+            client: identity.writer_guid.to_bytes(),
+            number: identity.sequence_number.into(),
+        }
+    }
+
+    fn identity(self) -> SampleIdentity {
+        SampleIdentity {
+            writer_guid: GUID::from_bytes(self.client),
+            sequence_number: SequenceNumber::from(self.number),
+        }
+    }
+
+    fn second_half(self) -> [u8; 8] {
+        std::array::from_fn(|index| self.client[8 + index])
+    }
+}
+
+impl Mapping {
+    fn wrap<M: RosMessage>(self, id: RequestId, message: M) -> Result<Cdr, RosError> {
+        match self {
+            Self::Cyclone => {
+                let framed = Framed {
+                    client: id.second_half(),
+                    number: id.number,
+                    message,
+                };
+                encode_as(M::TYPE_NAME, &framed)
+            }
+            Self::Enhanced => encode(&message),
+        }
+    }
+
+    /// Takes a request or response apart. `client` is whose first half of the identity counts.
+    fn unwrap<M: RosMessage>(
+        self,
+        sample: &RawSample,
+        client: [u8; 16],
+    ) -> Result<(RequestId, M), RosError> {
+        match self {
+            Self::Cyclone => {
+                let framed: Framed<M> = decode_as(M::TYPE_NAME, &sample.cdr)?;
+                let mut id = RequestId {
+                    client,
+                    number: framed.number,
+                };
+                id.client[8..].copy_from_slice(&framed.client);
+                Ok((id, framed.message))
+            }
+            Self::Enhanced => {
+                let own = RequestId {
+                    client: sample.info.writer.0,
+                    number: sample.info.sequence_number,
+                };
+                let id = match sample.info.related.map(RequestId::of) {
+                    Some(related) if related.number == i64::from(SequenceNumber::UNKNOWN) => {
+                        RequestId {
+                            number: own.number,
+                            ..related
+                        }
+                    }
+                    Some(related) => related,
+                    None => own,
+                };
+                Ok((id, decode(&sample.cdr)?))
+            }
+        }
+    }
+}
+
+/// Serves a service.
+pub struct Server<S> {
+    requests: RawSubscription,
+    responses: RawPublisher,
+    mapping: Mapping,
+    service: PhantomData<fn() -> S>,
+}
+
+impl<S: RosService> Server<S> {
+    pub(crate) fn new(
+        requests: RawSubscription,
+        responses: RawPublisher,
+        mapping: Mapping,
+    ) -> Self {
+        Self {
+            requests,
+            responses,
+            mapping,
+            service: PhantomData,
+        }
+    }
+
+    /// The next request, if there is one; it is answered with [`Self::respond`].
+    ///
+    /// Once it has returned nothing, the next request to come raises the node's [`Signal`].
+    ///
+    /// # Errors
+    /// If the bytes that came are no such request; the next call goes on with the next one.
+    pub fn take(&self) -> Result<Option<(RequestId, S::Request)>, RosError> {
+        let Some(sample) = self.requests.take()? else {
+            return Ok(None);
+        };
+        self.mapping.unwrap(&sample, sample.info.writer.0).map(Some)
+    }
+
+    /// Answers a request.
+    pub fn respond(&self, id: RequestId, response: S::Response) -> Result<(), RosError> {
+        let cdr = self.mapping.wrap(id, response)?;
+        self.responses.send(cdr, Some(id.identity())).map(|_| ())
+    }
+
+    /// Answers all requests that have come, and returns how many.
+    ///
+    /// A request that cannot be read is logged and passed over.
+    pub fn answer_all(
+        &self,
+        mut answer: impl FnMut(S::Request) -> S::Response,
+    ) -> Result<usize, RosError> {
+        let mut answered = 0;
+        loop {
+            match self.take() {
+                Ok(Some((id, request))) => {
+                    self.respond(id, answer(request))?;
+                    answered += 1;
+                }
+                Ok(None) => return Ok(answered),
+                Err(error @ RosError::Decode { .. }) => tracing::warn!("{error}"),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    pub(crate) fn set_signal(&mut self, signal: &Signal) {
+        self.requests.set_signal(signal);
+    }
+}
+
+/// Calls a service.
+pub struct Client<S> {
+    requests: RawPublisher,
+    responses: RawSubscription,
+    mapping: Mapping,
+    signal: Signal,
+    service: String,
+    next: AtomicI64,
+    kind: PhantomData<fn() -> S>,
+}
+
+impl<S: RosService> Client<S> {
+    pub(crate) fn new(
+        service: String,
+        requests: RawPublisher,
+        mut responses: RawSubscription,
+        mapping: Mapping,
+    ) -> Self {
+        let signal = Signal::new();
+        responses.set_signal(&signal);
+        let next = AtomicI64::new(1);
+        Self {
+            requests,
+            responses,
+            mapping,
+            signal,
+            service,
+            next,
+            kind: PhantomData,
+        }
+    }
+
+    /// Sends a request, and returns the id that its response will have.
+    pub fn send(&self, request: S::Request) -> Result<RequestId, RosError> {
+        let number = self.next.fetch_add(1, Ordering::Relaxed);
+        let id = RequestId {
+            client: self.requests.gid().0,
+            number,
+        };
+        let cdr = self.mapping.wrap(id, request)?;
+        let sent = match self.mapping {
+            Mapping::Cyclone => self.requests.send(cdr, Some(id.identity()))?,
+            Mapping::Enhanced => self.requests.send(cdr, None)?,
+        };
+        Ok(match self.mapping {
+            Mapping::Cyclone => id,
+            Mapping::Enhanced => RequestId::of(sent),
+        })
+    }
+
+    /// The next response to a request of this client, if there is one.
+    pub fn take(&self) -> Result<Option<(RequestId, S::Response)>, RosError> {
+        let own = self.requests.gid().0;
+        while let Some(sample) = self.responses.take()? {
+            let (id, response) = self.mapping.unwrap(&sample, own)?;
+            if id.client == own {
+                return Ok(Some((id, response)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Sends a request and waits for its response.
+    ///
+    /// # Errors
+    /// If no response comes in that time; the server may have received the request nevertheless.
+    pub fn call(&self, request: S::Request, timeout: Duration) -> Result<S::Response, RosError> {
+        let deadline = Instant::now() + timeout;
+        let id = self.send(request)?;
+        loop {
+            while let Some((answered, response)) = self.take()? {
+                if answered == id {
+                    return Ok(response);
+                }
+            }
+            let remaining = deadline.saturating_duration_since(Instant::now());
+            if remaining.is_zero() {
+                return Err(RosError::NoAnswer {
+                    service: self.service.clone(),
+                    waited: timeout,
+                });
+            }
+            self.signal.wait(remaining);
+        }
+    }
+
+    /// Whether a server is matched in both directions.
+    pub fn matched(&self) -> bool {
+        self.requests.matched() > 0 && self.responses.matched() > 0
+    }
+
+    /// Fully qualified name of the service.
+    pub fn service(&self) -> &str {
+        &self.service
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use swath_msgs::std_msgs::String as Text;
+
+    use super::*;
+    use crate::endpoint::{Gid, SampleInfo};
+
+    fn sample(cdr: Cdr, related: Option<SampleIdentity>) -> RawSample {
+        let writer = Gid(std::array::from_fn(|index| index as u8));
+        let info = SampleInfo {
+            source_time_ns: None,
+            received_time_ns: 0,
+            writer,
+            sequence_number: 5,
+            related,
+        };
+        RawSample { cdr, info }
+    }
+
+    #[test]
+    fn the_middleware_decides_on_the_mapping() {
+        for (name, mapping) in [
+            (None, Mapping::Cyclone),
+            (Some("rmw_cyclonedds_cpp"), Mapping::Cyclone),
+            (Some("rmw_fastrtps_cpp"), Mapping::Enhanced),
+            (Some("rmw_fastrtps_dynamic_cpp"), Mapping::Enhanced),
+            (Some("rmw_connextdds"), Mapping::Enhanced),
+        ] {
+            assert_eq!(Mapping::for_middleware(name), mapping, "{name:?}");
+        }
+    }
+
+    #[test]
+    fn cyclone_frames_carry_client_and_number_before_the_message() {
+        let client = std::array::from_fn(|index| index as u8);
+        let id = RequestId { client, number: 7 };
+        let text = Text {
+            data: "a".to_owned(),
+        };
+        let cdr = Mapping::Cyclone.wrap(id, text.clone()).unwrap();
+        let expected = [
+            &[0, 1, 0, 0][..],
+            &[8, 9, 10, 11, 12, 13, 14, 15],
+            &7_i64.to_le_bytes(),
+            &[2, 0, 0, 0, b'a', 0],
+        ]
+        .concat();
+        assert_eq!(cdr.as_bytes(), expected);
+        let read = Mapping::Cyclone
+            .unwrap::<Text>(&sample(cdr, None), client)
+            .unwrap();
+        assert_eq!(read, (id, text));
+    }
+
+    #[test]
+    fn enhanced_requests_are_named_by_the_sample() {
+        let text = Text {
+            data: "a".to_owned(),
+        };
+        let id = RequestId {
+            client: [9; 16],
+            number: 7,
+        };
+        let cdr = Mapping::Enhanced.wrap(id, text.clone()).unwrap();
+        assert_eq!(cdr, encode(&text).unwrap());
+        let unwrap = |related| {
+            let sample = sample(cdr.clone(), related);
+            Mapping::Enhanced
+                .unwrap::<Text>(&sample, [0; 16])
+                .unwrap()
+                .0
+        };
+        assert_eq!(unwrap(Some(id.identity())), id);
+        assert_eq!(unwrap(None).number, 5);
+        let unknown = RequestId {
+            number: SequenceNumber::UNKNOWN.into(),
+            ..id
+        };
+        assert_eq!(
+            unwrap(Some(unknown.identity())),
+            RequestId { number: 5, ..id }
+        );
+    }
+}

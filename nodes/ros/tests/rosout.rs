@@ -1,0 +1,34 @@
+//! Log lines of a node on `/rosout`; alone in its process, for the first node of a process has its log.
+
+use std::time::{Duration, Instant};
+
+use swath_ros::{Environment, Mapping, Node, RosArgs, graph};
+
+#[test]
+fn log_lines_reach_rosout() {
+    let environment = Environment {
+        domain: 220,
+        localhost_only: true,
+        mapping: Mapping::Cyclone,
+    };
+    let args = RosArgs::default();
+    let node = Node::start_in(environment.clone(), graph::PLANNER, &args).unwrap();
+    let listener = Node::start_in(environment, graph::LAUNCHER, &args).unwrap();
+    let lines = listener.subscription(&graph::ROSOUT).unwrap();
+    node.clock().set_ns(1_500_000_000);
+    tracing::warn!(limit = 3, "too much");
+    let deadline = Instant::now() + Duration::from_secs(20);
+    let line = loop {
+        // The line is latched: it does not matter that it came before the match.
+        if let Some(line) = lines.take().unwrap() {
+            break line;
+        }
+        assert!(Instant::now() < deadline, "no line came");
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    assert_eq!(line.msg, "too much limit=3");
+    assert_eq!(line.level, swath_msgs::rcl_interfaces::Log::WARN);
+    assert_eq!(line.name, "swath.planner");
+    assert_eq!((line.stamp.sec, line.stamp.nanosec), (1, 500_000_000));
+    assert!(line.file.ends_with("rosout.rs"), "{}", line.file);
+}
