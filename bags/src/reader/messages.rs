@@ -82,6 +82,8 @@ pub struct Messages<'a> {
     heap: BinaryHeap<Reverse<(u64, usize, usize)>>,
     /// Bytes in all `open[..].data`.
     held: usize,
+    /// Limit of `held`.
+    memory: usize,
     unpacker: Unpacker,
     packed: Vec<u8>,
 }
@@ -108,6 +110,7 @@ impl<'a> Messages<'a> {
             free: Vec::new(),
             heap: BinaryHeap::new(),
             held: 0,
+            memory: MEMORY_BYTES,
             unpacker: Unpacker::default(),
             packed: Vec::new(),
         })
@@ -239,13 +242,13 @@ impl<'a> Messages<'a> {
 
     /// Frees memory by dropping the chunks whose next message is farthest away.
     fn drop_far_chunks(&mut self, keep: usize) {
-        if self.held <= MEMORY_BYTES {
+        if self.held <= self.memory {
             return;
         }
         let mut slots: Vec<(u64, usize, usize)> = self.heap.iter().map(|Reverse(at)| *at).collect();
         slots.sort_unstable_by(|a, b| b.cmp(a));
         for (_, _, slot) in slots {
-            if self.held <= MEMORY_BYTES {
+            if self.held <= self.memory {
                 break;
             }
             if slot != keep {
@@ -255,5 +258,39 @@ impl<'a> Messages<'a> {
                 open.data = Vec::new();
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BagOptions, BagWriter, Topic};
+
+    #[test]
+    fn chunks_are_dropped_and_read_again_to_keep_within_memory() {
+        let temp = tempfile::tempdir().unwrap();
+        let dir = temp.path().join("mixed");
+        let options = BagOptions { chunk_bytes: 1000, ..BagOptions::default() };
+        let writer = BagWriter::create(&dir, options).unwrap();
+        let topic = Topic::new("/x", "a/msg/B", "uint64 n\n", "", vec![]).unwrap();
+        let topic = writer.add_topic(&topic).unwrap();
+        // 7919 is prime: every chunk spans all of time.
+        for n in 0..3000 {
+            let time = n * 7919 % 3000;
+            writer.write(topic, time, time, &time.to_le_bytes()).unwrap();
+        }
+        writer.close().unwrap();
+        let bag = Bag::open(&dir).unwrap();
+        let mut messages = bag.messages(&Filter::default()).unwrap();
+        messages.memory = 10_000;
+        let mut most = 0;
+        for time in 0..3000u64 {
+            let message = messages.next().unwrap().unwrap();
+            assert_eq!((message.log_time, message.data), (time, &time.to_le_bytes()[..]));
+            most = most.max(messages.held);
+        }
+        assert_eq!(messages.next().unwrap(), None);
+        assert!(most > 5000 && most <= 12_000, "{most} bytes held");
+        assert_eq!(messages.held, 0);
     }
 }

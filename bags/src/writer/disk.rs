@@ -300,8 +300,8 @@ fn next_job(shared: &Shared) -> Option<Job> {
             state.seal(None);
             continue;
         }
-        // Half the interval keeps a chunk's age on disk below one and a half intervals.
-        let waited = shared.work.wait_timeout(state, interval / 2);
+        // A chunk grows no older than one and a quarter intervals.
+        let waited = shared.work.wait_timeout(state, interval / 4);
         state = waited.unwrap_or_else(PoisonError::into_inner).0;
     }
 }
