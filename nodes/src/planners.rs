@@ -77,7 +77,7 @@ impl fmt::Display for PlannerSpec {
 impl PlannerSpec {
     /// Makes the planner for a mission of this seed.
     #[must_use]
-    pub fn make(&self, seed: u64) -> Box<dyn Planner> {
+    pub fn make(&self, seed: u64) -> Box<dyn Planner + Send> {
         match *self {
             Self::Heuristic(t_pre_s) => Box::new(Heuristic { t_pre_s }),
             Self::Random => Box::new(Random { seed }),

@@ -49,7 +49,7 @@ impl TaskLine {
             success: record.success(),
             reason: record.strip.and(record.outcome.failure),
             max_attitude_error: record.outcome.max_attitude_error,
-            min_elevation_deg: record.outcome.min_elevation().to_degrees(),
+            min_elevation_deg: record.outcome.min_elevation.to_degrees(),
             reward: record.reward,
         }
     }

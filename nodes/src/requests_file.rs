@@ -1,7 +1,7 @@
 //! Strip requests from GeoJSON files.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, BufWriter, Read, Write as _};
 use std::path::{Path, PathBuf};
 
 use geojson::{Feature, GeoJson, GeometryValue, Position};
@@ -45,6 +45,14 @@ pub enum RequestsFileError {
         path: PathBuf,
         /// Where and why.
         source: Box<geojson::Error>,
+    },
+    /// The file cannot be written.
+    #[error("cannot write requests {path}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
     },
     /// A feature is no strip.
     #[error("requests {path}, feature {feature}: {reason}")]
@@ -98,6 +106,42 @@ pub fn read(path: &Path) -> Result<Vec<NamedRequest>, RequestsFileError> {
         requests.extend(found);
     }
     Ok(requests)
+}
+
+/// Writes requests to a GeoJSON file that [`read`] gives back as they are.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write(path: &Path, requests: &[NamedRequest]) -> Result<(), RequestsFileError> {
+    let unwritable = |source| RequestsFileError::Write { path: path.to_owned(), source };
+    let mut file = BufWriter::new(File::create(path).map_err(unwritable)?);
+    file.write_all(b"{\"type\":\"FeatureCollection\",\"features\":[").map_err(unwritable)?;
+    for (i, named) in requests.iter().enumerate() {
+        let separator = if i == 0 { "\n" } else { ",\n" };
+        write!(file, "{separator}{}", feature_of(named)).map_err(unwritable)?;
+    }
+    file.write_all(b"\n]}\n").and_then(|()| file.flush()).map_err(unwritable)
+}
+
+fn feature_of(named: &NamedRequest) -> serde_json::Value {
+    let request = &named.request;
+    serde_json::json!({
+        "type": "Feature",
+        "properties": {
+            "name": named.name,
+            "client_ref": named.client_ref,
+            "priority": request.priority,
+            "acquisition_speed_m_s": request.acquisition_speed_m_s,
+            "bidirectional": request.bidirectional,
+        },
+        "geometry": {
+            "type": "LineString",
+            "coordinates": [
+                [request.start_longitude_deg, request.start_latitude_deg],
+                [request.end_longitude_deg, request.end_latitude_deg],
+            ],
+        },
+    })
 }
 
 fn strips_of(feature: &Feature, fallback: &str) -> Result<Vec<NamedRequest>, String> {
@@ -155,8 +199,6 @@ fn ends(line: &[Position]) -> Result<(&[f64], &[f64]), String> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write as _;
-
     use super::*;
 
     fn read_text(text: &str) -> Result<Vec<NamedRequest>, String> {
@@ -181,6 +223,17 @@ mod tests {
         assert!(requests[0].request.bidirectional);
         assert_eq!(requests[1].request.acquisition_speed_m_s, DEFAULT_SPEED_M_S);
         assert!(requests[2].name.ends_with(" 2"));
+    }
+
+    #[test]
+    fn random_requests_survive_a_file_to_the_last_bit() {
+        let scenario = swath_sim::scenario::ScenarioConfig::default();
+        let random = scenario.generate(&mut swath_sim::rng::stream(3, 1), 500, 6_378_136.6);
+        let named = |(i, request)| NamedRequest { client_ref: format!("r{i}"), name: format!("strip {i}"), request };
+        let requests: Vec<_> = random.into_iter().enumerate().map(named).collect();
+        let file = tempfile::NamedTempFile::new().unwrap();
+        write(file.path(), &requests).unwrap();
+        assert_eq!(read(file.path()).unwrap(), requests);
     }
 
     #[test]

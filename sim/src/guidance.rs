@@ -1,5 +1,7 @@
 //! Strip guidance (paper, eqs 1-13): reference attitude, tracking error, constraints, and the task in hand.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -91,20 +93,14 @@ pub struct TaskOutcome {
     pub failure: Option<FailureReason>,
     /// Largest ‖σ_BR‖ while imaging; 0 when imaging did not begin.
     pub max_attitude_error: f64,
-    /// Least sine of the elevation while imaging; 1 when imaging did not begin.
-    pub min_sin_elevation: f64,
+    /// Least elevation while imaging [rad]; π/2 when imaging did not begin.
+    pub min_elevation: f64,
 }
 
 impl TaskOutcome {
     /// Outcome of a task that never began.
     pub const NOT_BEGUN: Self =
-        Self { failure: Some(FailureReason::Interrupted), max_attitude_error: 0.0, min_sin_elevation: 1.0 };
-
-    /// Least elevation while imaging [rad]; π/2 when imaging did not begin.
-    #[must_use]
-    pub fn min_elevation(&self) -> f64 {
-        libm::asin(self.min_sin_elevation)
-    }
+        Self { failure: Some(FailureReason::Interrupted), max_attitude_error: 0.0, min_elevation: FRAC_PI_2 };
 }
 
 /// What guidance knows and commands at one tick.
@@ -118,6 +114,14 @@ pub struct GuidanceTick {
     pub sin_elevation: f64,
     /// Whether the strip is being imaged.
     pub imaging: bool,
+}
+
+impl GuidanceTick {
+    /// Elevation of the satellite seen from the target [rad]; π/2 in a wait.
+    #[must_use]
+    pub fn elevation(&self) -> f64 {
+        libm::asin(self.sin_elevation)
+    }
 }
 
 /// The guidance and control computer: one task at a time, one torque command a tick.
@@ -189,7 +193,7 @@ impl ImagingRecord {
         TaskOutcome {
             failure,
             max_attitude_error: self.max_error_squared.sqrt(),
-            min_sin_elevation: self.min_sin_elevation,
+            min_elevation: libm::asin(self.min_sin_elevation),
         }
     }
 }

@@ -6,15 +6,13 @@ use swath_sim::guidance::Task;
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Heuristic, Planner, PlannerError};
 
-/// The candidates of a task, with the names of their strips.
+/// The candidates of a task.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Upcoming {
     /// Number of the task.
     pub task: u64,
     /// The candidates.
     pub candidates: Vec<Candidate>,
-    /// Name of each candidate's strip.
-    pub names: Vec<String>,
 }
 
 /// A decision made.
@@ -127,8 +125,7 @@ mod tests {
     }
 
     fn upcoming(env: &Env, task: u64) -> Upcoming {
-        let candidates = env.context().candidates.to_vec();
-        Upcoming { task, names: vec![String::new(); candidates.len()], candidates }
+        Upcoming { task, candidates: env.context().candidates.to_vec() }
     }
 
     #[test]

@@ -35,6 +35,14 @@ pub enum Refusal {
         /// The reference.
         client_ref: String,
     },
+    /// There are too many requests in one call.
+    #[error("{count} requests in one call, the limit is {max}")]
+    Batch {
+        /// Requests in the call.
+        count: usize,
+        /// Most allowed.
+        max: usize,
+    },
     /// There are too many strips.
     #[error("{count} strips are held, the limit is {CAPACITY}")]
     Capacity {
@@ -51,7 +59,7 @@ impl Refusal {
             Self::Strip(error) => error.code(),
             Self::Text { .. } => 107,
             Self::Duplicate { .. } => 108,
-            Self::Capacity { .. } => 109,
+            Self::Capacity { .. } | Self::Batch { .. } => 109,
         }
     }
 }
@@ -131,6 +139,8 @@ pub struct RequestLogic {
     by_client_ref: BTreeMap<String, StripId>,
     rejected: usize,
     now: Tick,
+    /// Tasks below this number are settled.
+    settled: u64,
     changes: Vec<Change>,
 }
 
@@ -147,6 +157,7 @@ impl RequestLogic {
             by_client_ref: BTreeMap::new(),
             rejected: 0,
             now: Tick(0),
+            settled: 0,
             changes: Vec::new(),
         }
     }
@@ -210,7 +221,10 @@ impl RequestLogic {
     /// A task is wanted at `now`; `finished` is the one that just ended. Answers with the candidates.
     pub fn on_decision_point(&mut self, task: u64, now: Tick, finished: Option<&TaskRecord>) -> Offer {
         self.now = self.now.max(now);
-        if let Some(record) = finished {
+        if let Some(record) = finished
+            && record.task >= self.settled
+        {
+            self.settled = record.task + 1;
             self.settle(record);
         }
         let mut candidates = Vec::new();
@@ -360,10 +374,10 @@ mod tests {
         RequestLogic::new(model, &initial, Tick(172_800))
     }
 
-    fn record(id: StripId, failure: Option<FailureReason>) -> TaskRecord {
-        let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_sin_elevation: 0.5 };
+    fn record(task: u64, id: StripId, failure: Option<FailureReason>) -> TaskRecord {
+        let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_elevation: 0.5 };
         let reward = if failure.is_none() { 0.5 } else { 0.0 };
-        TaskRecord { task: 0, start: Tick(0), end: Tick(300), strip: Some(id), t_pre: 100, t_acq: 200, outcome, reward }
+        TaskRecord { task, start: Tick(0), end: Tick(300), strip: Some(id), t_pre: 100, t_acq: 200, outcome, reward }
     }
 
     #[test]
@@ -382,10 +396,11 @@ mod tests {
         let id = logic.submit(equatorial_request("a", 10.0)).unwrap();
         logic.on_task(id);
         assert_eq!(logic.standing(id), Some(Standing::Scheduled));
-        let offer = logic.on_decision_point(1, Tick(300), Some(&record(id, Some(FailureReason::Attitude))));
+        let offer = logic.on_decision_point(1, Tick(300), Some(&record(0, id, Some(FailureReason::Attitude))));
         assert_eq!(offer.candidates.len(), 1);
         logic.on_task(id);
-        let offer = logic.on_decision_point(2, Tick(600), Some(&record(id, None)));
+        let offer = logic.on_decision_point(2, Tick(600), Some(&record(1, id, None)));
+        logic.on_decision_point(2, Tick(600), Some(&record(1, id, None)));
         assert!(offer.candidates.is_empty());
         assert_eq!((offer.pending, offer.fulfilled), (0, 1));
         let changes = logic.take_changes();
@@ -400,7 +415,7 @@ mod tests {
         let mut named = equatorial_request("a", 10.0);
         named.request.bidirectional = true;
         let id = logic.submit(named).unwrap();
-        logic.on_decision_point(1, Tick(300), Some(&record(id, None)));
+        logic.on_decision_point(1, Tick(300), Some(&record(0, id, None)));
         assert_eq!(logic.standing(StripId(2)), Some(Standing::FulfilledByLink));
         assert_eq!(logic.counts()[&Standing::FulfilledByLink], 1);
     }

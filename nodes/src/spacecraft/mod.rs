@@ -1,3 +1,5 @@
 //! The spacecraft node: dynamics, wheels, orbit and the clock.
 
 pub mod logic;
+mod telemetry;
+pub mod wiring;

@@ -1,0 +1,5 @@
+//! The planner node; see `swath_nodes::planner`.
+
+fn main() -> std::process::ExitCode {
+    swath_nodes::node::exit_code(swath_nodes::planner::wiring::run())
+}

@@ -1,0 +1,36 @@
+//! The operator's command line.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use swath_nodes::{launch, node, strips};
+
+/// Flies and operates a super-agile Earth-observing satellite that images ground strips.
+#[derive(Parser)]
+#[command(version, about)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Start the nodes of a mission, watch them, and leave bag, tasks and summary.
+    Launch(launch::LaunchArgs),
+    /// Submit strips to a flying mission.
+    Strips(strips::StripsArgs),
+    /// Print the node graph as a Mermaid diagram and as a table.
+    Graph,
+}
+
+#[expect(clippy::print_stdout, reason = "the diagram is this command's result")]
+fn main() -> ExitCode {
+    node::exit_code(match Args::parse().command {
+        Command::Launch(args) => launch::run(&args),
+        Command::Strips(args) => strips::run(&args),
+        Command::Graph => {
+            println!("{}\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table());
+            Ok(())
+        }
+    })
+}
