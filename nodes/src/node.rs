@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, bail};
 use clap::Parser;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use swath_ros::params::Spec;
+use swath_ros::Spec;
 use swath_ros::{Node, Publisher, RosArgs, Shutdown, graph};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;

@@ -84,9 +84,9 @@ fn text(path: &Path) -> Result<String> {
 }
 
 fn count_messages(bag: &Path) -> Result<u64> {
-    let info = swath_bags::metadata::BagMetadata::read(bag)
-        .with_context(|| format!("cannot read the bag {}", bag.display()))?;
-    Ok(info.message_count)
+    let information = swath_bags::metadata::BagInformation::read(bag)?;
+    let information = information.with_context(|| format!("the bag {} has no metadata.yaml", bag.display()))?;
+    Ok(information.message_count)
 }
 
 struct Launcher {

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::params::Spec;
+use swath_ros::Spec;
 use swath_ros::{Publisher, Subscription, graph};
 
 use super::logic::{Planned, PlannerLogic};

@@ -9,7 +9,7 @@ use swath_sim::guidance::FailureReason;
 use swath_sim::model::Model;
 use swath_sim::orbit::Orbit;
 use swath_sim::scenario::InitialState;
-use swath_sim::strip::{StripId, StripRequest};
+use swath_sim::strip::StripId;
 use swath_sim::time::Tick;
 use thiserror::Error;
 
@@ -348,7 +348,7 @@ pub fn equatorial_request(client_ref: &str, longitude_deg: f64) -> NamedRequest 
     NamedRequest {
         client_ref: client_ref.to_owned(),
         name: client_ref.to_owned(),
-        request: StripRequest {
+        request: swath_sim::strip::StripRequest {
             start_latitude_deg: 5.0,
             start_longitude_deg: longitude_deg,
             end_latitude_deg: 6.0,

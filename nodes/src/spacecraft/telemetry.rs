@@ -4,7 +4,7 @@ use anyhow::Result;
 use swath_msgs::geometry_msgs::{Quaternion, Transform, TransformStamped};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix, NavSatStatus};
 use swath_msgs::tf2_msgs::TFMessage;
-use swath_ros::params::Spec;
+use swath_ros::Spec;
 use swath_ros::{Publisher, graph};
 use swath_sim::mrp;
 use swath_sim::orbit::latitude_longitude_deg;

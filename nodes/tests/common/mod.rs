@@ -1,0 +1,47 @@
+//! Launching missions in tests.
+#![allow(dead_code, missing_docs, reason = "each test uses its part")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::atomic::{AtomicU16, Ordering};
+
+/// A DDS domain of this test's own: test binaries run one after the other, their tests side by side.
+pub fn domain() -> String {
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    (100 + u16::try_from(std::process::id() % 10).unwrap_or(0) * 10 + NEXT.fetch_add(1, Ordering::Relaxed) % 10).to_string()
+}
+
+/// A command of this suite on a domain.
+pub fn command(program: &str, domain: &str) -> Command {
+    let exe = Path::new(env!("CARGO_BIN_EXE_swath"));
+    let mut command = Command::new(exe.with_file_name(program));
+    command.env("ROS_DOMAIN_ID", domain).env("ROS_LOCALHOST_ONLY", "1");
+    command
+}
+
+/// Writes a mission file.
+pub fn write_mission(folder: &Path, text: &str) -> PathBuf {
+    let path = folder.join("mission.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+/// Runs a command to its end.
+pub fn run(command: &mut Command) -> Output {
+    command.output().unwrap()
+}
+
+/// Runs a command that must succeed.
+pub fn succeed(command: &mut Command) -> String {
+    let output = run(command);
+    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{command:?} failed: {}\n{stdout}\n{stderr}", output.status);
+    stdout.into_owned()
+}
+
+/// Runs a command that must fail with an exit code, and returns what it says on stderr.
+pub fn fail(command: &mut Command) -> String {
+    let output = run(command);
+    assert_eq!(output.status.code(), Some(1), "{command:?}: {}", output.status);
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
