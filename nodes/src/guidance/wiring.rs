@@ -120,7 +120,8 @@ impl GuidanceNode {
             return Ok(left.min(ASK_AGAIN_AFTER));
         }
         let hold = self.base.mission.hold_s;
-        let text = format!("task {task} did not come within {} s: holding attitude for {hold} s", self.deadline.as_secs_f64());
+        let text =
+            format!("task {task} did not come within {} s: holding attitude for {hold} s", self.deadline.as_secs_f64());
         self.base.alarm(Severity::Warn, "planner late", &text)?;
         let effects = self.logic.on_deadline();
         self.carry_out(effects)?;
@@ -135,8 +136,7 @@ impl GuidanceNode {
                     let message = to_msg::decision_point(&self.base.stamper, &point);
                     self.points.publish(&message)?;
                     let now = Instant::now();
-                    self.question =
-                        (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
+                    self.question = (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
                 }
             }
         }

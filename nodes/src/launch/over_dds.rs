@@ -169,12 +169,7 @@ impl Launcher {
     }
 
     /// Takes a result once: guidance asks again when an answer is late.
-    fn take_result(
-        &mut self,
-        result: &msg::TaskResult,
-        output: &mut OutputFolder,
-        totals: &mut Totals,
-    ) -> Result<()> {
+    fn take_result(&mut self, result: &msg::TaskResult, output: &mut OutputFolder, totals: &mut Totals) -> Result<()> {
         if result.task < self.next_task {
             return Ok(());
         }

@@ -134,12 +134,9 @@ fn answer(logic: &mut RequestLogic, call: msg::SubmitStripsRequest) -> msg::Subm
     };
     let results = call.requests.iter().map(submit).map(|result| match result {
         Ok(id) => msg::SubmitResult { accepted: true, id: id.0, ..msg::SubmitResult::default() },
-        Err(refusal) => msg::SubmitResult {
-            accepted: false,
-            id: 0,
-            reason_code: refusal.code(),
-            reason: refusal.to_string(),
-        },
+        Err(refusal) => {
+            msg::SubmitResult { accepted: false, id: 0, reason_code: refusal.code(), reason: refusal.to_string() }
+        }
     });
     msg::SubmitStripsResponse { results: results.collect::<Vec<_>>() }
 }

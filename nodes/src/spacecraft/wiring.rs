@@ -80,7 +80,11 @@ impl SpacecraftNode {
     fn fly(&mut self) -> Result<()> {
         let first = self.logic.sample();
         self.publish(&first)?;
-        if self.pace > 0.0 { self.fly_paced()? } else { self.fly_in_lockstep()? }
+        if self.pace > 0.0 {
+            self.fly_paced()?
+        } else {
+            self.fly_in_lockstep()?
+        }
         if self.logic.missed > 0 {
             let text = format!("{} ticks were flown without a command", self.logic.missed);
             self.base.alarm(Severity::Warn, "late commands", &text)?;

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicU16, Ordering};
 /// A DDS domain of this test's own: test binaries run one after the other, their tests side by side.
 pub fn domain() -> String {
     static NEXT: AtomicU16 = AtomicU16::new(0);
-    (100 + u16::try_from(std::process::id() % 10).unwrap_or(0) * 10 + NEXT.fetch_add(1, Ordering::Relaxed) % 10).to_string()
+    (100 + u16::try_from(std::process::id() % 10).unwrap_or(0) * 10 + NEXT.fetch_add(1, Ordering::Relaxed) % 10)
+        .to_string()
 }
 
 /// A command of this suite on a domain.
