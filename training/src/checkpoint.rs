@@ -233,7 +233,7 @@ fn rng_from(bytes: &[u8], path: &Path) -> Result<ChaCha8Rng> {
 }
 
 /// Settings that may differ between a checkpoint and the run that goes on from it.
-const MAY_DIFFER: [&str; 2] = ["steps", "checkpoint_every"];
+const MAY_DIFFER: [&str; 3] = ["name", "steps", "checkpoint_every"];
 
 fn check_same_run(found: &RunConfig, wanted: &RunConfig, path: &Path) -> Result<()> {
     let (found, wanted) = (settings(found)?, settings(wanted)?);

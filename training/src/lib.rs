@@ -7,6 +7,7 @@ pub mod distribution;
 pub mod environment;
 pub mod error;
 pub mod evaluate;
+pub mod figures;
 pub mod gae;
 pub mod network;
 pub mod parameters;

@@ -23,6 +23,8 @@ enum Command {
     Evaluate(command::evaluate::EvaluateArgs),
     /// Fly the heuristic with fixed transition times of 10 to 120 s
     Sweep(command::evaluate::SweepArgs),
+    /// Draw the paper's Figures 3, 4 and 5 from recorded runs and evaluations
+    Figures(command::figures::FiguresArgs),
 }
 
 fn main() -> ExitCode {
@@ -31,6 +33,7 @@ fn main() -> ExitCode {
         Command::Train(args) => command::train::train(&args),
         Command::Evaluate(args) => command::evaluate::evaluate(&args),
         Command::Sweep(args) => command::evaluate::sweep(&args),
+        Command::Figures(args) => command::figures::figures(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

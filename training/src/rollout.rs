@@ -69,7 +69,8 @@ impl Slot {
         Ok(Slot { environment, rng, seed: first, actions: Vec::new(), tally: Tally::default() })
     }
 
-    /// Brings an environment back to a saved state.
+    /// Brings an environment back to a saved state. Should an environment that has changed since
+    /// end the episode sooner, the next one begins.
     pub fn restore(environment: Box<dyn Environment>, state: SlotState) -> Result<Slot> {
         let mut slot = Slot {
             environment,
@@ -81,7 +82,8 @@ impl Slot {
         slot.environment.reset(slot.seed)?;
         for action in state.actions {
             if slot.step(action)?.progress != Progress::Continues {
-                return Err(TrainingError::Environment("a saved episode ends before its last action".into()));
+                slot.begin()?;
+                break;
             }
         }
         Ok(slot)

@@ -1,6 +1,7 @@
 //! The commands of `swath-train`.
 
 pub mod evaluate;
+pub mod figures;
 pub mod train;
 
 fn cores() -> usize {

@@ -11,9 +11,10 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
-use swath_training::checkpoint;
+use swath_training::checkpoint::{self, REVISION};
 use swath_training::config::RunConfig;
 use swath_training::process;
+use swath_training::store::Content;
 use swath_training::tensorboard::EventWriter;
 use swath_training::trainer::{Report, Trainer};
 
@@ -115,6 +116,10 @@ impl Folder {
         };
         let trainer = Trainer::resume(run, &path, device)?;
         eprintln!("going on from {} at step {}", path.display(), trainer.steps());
+        let revision = checkpoint::header(&Content::read(&path)?, &path)?.revision;
+        if revision != REVISION {
+            eprintln!("warning: it was made by revision {revision}, this is {REVISION}: going on may not be exact");
+        }
         fs::create_dir_all(self.checkpoints())
             .with_context(|| format!("cannot make {}", self.checkpoints().display()))?;
         self.forget_progress_after(trainer.steps())?;
