@@ -28,7 +28,7 @@ fn faulty_requests_are_refused_with_their_place() {
     for (text, expected) in [
         (r#"{"type":"FeatureCollection","features":[{"type":"Feat"#, "is not GeoJSON"),
         (r#"{"type":"Point","coordinates":[1,2]}"#, "a Point is no strip"),
-        (r#"{"type":"LineString","coordinates":[[1,2],[3]]}"#, "is not GeoJSON"),
+        (r#"{"type":"LineString","coordinates":[[1,2],[3]]}"#, "feature 1: a line needs two points"),
     ] {
         std::fs::write(&file, text).unwrap();
         let mut submit = common::command("swath", "0");

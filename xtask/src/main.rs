@@ -12,6 +12,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 
+/// What `cargo xtask mission` flies.
+const MISSION: &str = "examples/missions/one_orbit.toml";
+
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
@@ -19,8 +22,8 @@ usage: cargo xtask COMMAND
                    543 MB), and with --test the Python environment of the tests
   test [ARGS…]     set up, then run every test of the workspace; ARGS go to
                    `cargo test`
-  mission [ARGS…]  set up, build, and fly one mission; ARGS go to `swath launch`
-                   (--help shows them)
+  mission [ARGS…]  set up, build, and fly examples/missions/one_orbit.toml; ARGS
+                   go to `swath launch` (--help shows them)
   bench            run every crate's measurements and print one JSON object
 ";
 
@@ -71,11 +74,11 @@ fn setup(root: &Path, tests: bool) -> Result<()> {
     Ok(())
 }
 
-/// Runs every test in the development profile: one build serves all of them.
+/// Runs every test in the release profile: what is tested is what is flown, and one build serves both commands.
 fn test(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, true)?;
     let mut cargo = process::cargo(root, "test");
-    cargo.arg("--workspace").args(args);
+    cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));
     process::run(&mut cargo)
 }
@@ -86,7 +89,7 @@ fn mission(root: &Path, args: &[OsString]) -> Result<()> {
     process::run(process::cargo(root, "build").args(["--quiet", "--release", "--package", "swath-nodes", "--bins"]))?;
     let mut cargo = process::cargo(root, "run");
     cargo.args(["--quiet", "--release", "--package", "swath-nodes"]);
-    cargo.args(["--bin", "swath", "--", "launch"]).args(args);
+    cargo.args(["--bin", "swath", "--", "launch", MISSION]).args(args);
     Err(process::become_command(&mut cargo))
 }
 

@@ -29,7 +29,7 @@ fn main() -> ExitCode {
         Command::Launch(args) => launch::run(&args),
         Command::Strips(args) => strips::run(&args),
         Command::Graph => {
-            println!("{}\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table());
+            print!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table());
             Ok(())
         }
     })

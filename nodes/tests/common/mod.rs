@@ -46,3 +46,39 @@ pub fn fail(command: &mut Command) -> String {
     assert_eq!(output.status.code(), Some(1), "{command:?}: {}", output.status);
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
+
+/// A script of `tests/python` in the Python environment that `cargo xtask test` makes.
+pub fn python(script: &str, domain: &str) -> Command {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let interpreter = std::env::var_os("SWATH_PYTHON").map_or(root.join("../.venv/bin/python"), PathBuf::from);
+    assert!(interpreter.exists(), "no Python at {}: run `cargo xtask setup --test`", interpreter.display());
+    let mut command = Command::new(interpreter);
+    command.arg(root.join("tests/python").join(script)).arg(domain);
+    command.env("CYCLONEDDS_URI", "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>");
+    command
+}
+
+/// A process that is ended with the test.
+pub struct Running(std::process::Child);
+
+impl Running {
+    /// Starts it.
+    pub fn start(command: &mut Command) -> Self {
+        Self(command.spawn().unwrap())
+    }
+
+    /// Interrupts it as Ctrl-C does, and waits until it has ended.
+    pub fn stop(&mut self) {
+        let pid = rustix::process::Pid::from_raw(self.0.id() as i32).unwrap();
+        let _ = rustix::process::kill_process(pid, rustix::process::Signal::INT);
+        self.0.wait().unwrap();
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if self.0.try_wait().unwrap().is_none() {
+            self.stop();
+        }
+    }
+}

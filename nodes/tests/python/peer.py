@@ -1,0 +1,207 @@
+"""An outside ROS 2 peer over CycloneDDS: receives states, submits strips, and sees one of them imaged.
+
+Prints one JSON object; exits with 1 when something does not come in time.
+"""
+
+import json
+import sys
+import time
+from dataclasses import dataclass
+
+import cyclonedds.idl.annotations as ann
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, float64, int32, int64, sequence, uint8, uint16, uint32, uint64
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+COMPLETED = 6
+TIMEOUT_S = 60.0
+
+
+@dataclass
+@ann.final
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+@ann.final
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+@ann.final
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
+@ann.final
+class SpacecraftState(IdlStruct, typename="swath_msgs::msg::dds_::SpacecraftState_"):
+    header: Header
+    tick: uint64
+    r_bn_n: Vector3
+    v_bn_n: Vector3
+    sigma_bn: array[float64, 3]
+    omega_bn_b: Vector3
+    wheel_speed: array[float64, 3]
+    wheel_torque: array[float64, 3]
+
+
+@dataclass
+@ann.final
+class Strip(IdlStruct, typename="swath_msgs::msg::dds_::Strip_"):
+    id: uint64
+    name: str
+    start_latitude_deg: float64
+    start_longitude_deg: float64
+    end_latitude_deg: float64
+    end_longitude_deg: float64
+    priority: float64
+    acquisition_speed: float64
+
+
+@dataclass
+@ann.final
+class StripStatus(IdlStruct, typename="swath_msgs::msg::dds_::StripStatus_"):
+    header: Header
+    strip: Strip
+    client_ref: str
+    state: uint8
+    reason_code: uint16
+    reason: str
+    tick: uint64
+    attempts: uint32
+    reward: float64
+    linked_to: uint64
+
+
+@dataclass
+@ann.final
+class StripRequest(IdlStruct, typename="swath_msgs::msg::dds_::StripRequest_"):
+    client_ref: str
+    submitter: str
+    name: str
+    start_latitude_deg: float64
+    start_longitude_deg: float64
+    end_latitude_deg: float64
+    end_longitude_deg: float64
+    priority: float64
+    acquisition_speed: float64
+    bidirectional: bool
+    valid_from: Time
+    valid_until: Time
+    hold_for_approval: bool
+    max_attempts: uint32
+
+
+@dataclass
+@ann.final
+class SubmitResult(IdlStruct, typename="swath_msgs::msg::dds_::SubmitResult_"):
+    accepted: bool
+    id: uint64
+    reason_code: uint16
+    reason: str
+
+
+@dataclass
+@ann.final
+class SubmitRequest(IdlStruct, typename="swath_msgs::srv::dds_::SubmitStrips_Request_"):
+    client: uint64
+    number: int64
+    requests: sequence[StripRequest]
+
+
+@dataclass
+@ann.final
+class SubmitResponse(IdlStruct, typename="swath_msgs::srv::dds_::SubmitStrips_Response_"):
+    client: uint64
+    number: int64
+    results: sequence[SubmitResult]
+
+
+class Peer:
+    def __init__(self, domain):
+        participant = DomainParticipant(domain)
+        reliable = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(1000))
+
+        def reader(name, kind):
+            return DataReader(participant, Topic(participant, name, kind), reliable)
+
+        def writer(name, kind):
+            return DataWriter(participant, Topic(participant, name, kind), reliable)
+
+        self.states = reader("rt/swath/spacecraft/state", SpacecraftState)
+        self.events = reader("rt/swath/requests/events", StripStatus)
+        self.plain = writer("rt/swath/requests/request", StripRequest)
+        self.requests = writer("rq/swath/requests/submitRequest", SubmitRequest)
+        self.responses = reader("rr/swath/requests/submitReply", SubmitResponse)
+
+    def wait(self, what, look):
+        deadline = time.monotonic() + TIMEOUT_S
+        while time.monotonic() < deadline:
+            found = look()
+            if found is not None:
+                return found
+            time.sleep(0.01)
+        sys.exit(f"{what} did not come within {TIMEOUT_S} s")
+
+    def submit(self, strips):
+        """Calls the service; asks again, because a request can be lost before both ends are matched."""
+        for number in range(1, 20):
+            self.requests.write(SubmitRequest(77, number, strips))
+            deadline = time.monotonic() + 1.0
+            while time.monotonic() < deadline:
+                for response in self.responses.take(10):
+                    if response.client == 77:
+                        return response.results
+                time.sleep(0.01)
+        sys.exit("nobody answers requests/submit")
+
+
+def request(reference, latitude, longitude):
+    return StripRequest(
+        reference, "peer", reference, latitude, longitude, latitude + 1.0, longitude + 1.5, 0.9, 3000.0,
+        False, Time(0, 0), Time(0, 0), False, 0,
+    )
+
+
+def main():
+    peer = Peer(int(sys.argv[1]))
+    state = peer.wait("a spacecraft state", lambda: next(iter(peer.states.take(1)), None))
+    grid = [(latitude, longitude) for latitude in range(-40, 45, 10) for longitude in range(-180, 180, 20)]
+    results = peer.submit([request(f"peer-{i}", *place) for i, place in enumerate(grid)])
+    refused = peer.submit([request("peer-nan", float("nan"), 0.0), request("peer-north", 90.5, 0.0)])
+    peer.plain.write(request("peer-plain", 5.0, 10.0))
+    ids = {result.id for result in results if result.accepted}
+    seen = set()
+
+    def imaged():
+        for event in peer.events.take(1000):
+            seen.add(event.client_ref)
+            if event.state == COMPLETED and event.strip.id in ids:
+                return event
+        return None
+
+    event = peer.wait("an imaged strip", imaged)
+    peer.wait("the plain topic's request", lambda: True if imaged() or "peer-plain" in seen else None)
+    print(json.dumps({
+        "first_tick": state.tick,
+        "radius_m": (state.r_bn_n.x**2 + state.r_bn_n.y**2 + state.r_bn_n.z**2) ** 0.5,
+        "accepted": len(ids),
+        "refused": [result.reason_code for result in refused],
+        "imaged": event.client_ref,
+        "imaged_reward": event.reward,
+    }))
+
+
+main()
