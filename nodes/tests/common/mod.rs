@@ -54,7 +54,10 @@ pub fn python(script: &str, domain: &str) -> Command {
     assert!(interpreter.exists(), "no Python at {}: run `cargo xtask setup --test`", interpreter.display());
     let mut command = Command::new(interpreter);
     command.arg(root.join("tests/python").join(script)).arg(domain);
-    command.env("CYCLONEDDS_URI", "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>");
+    command.env(
+        "CYCLONEDDS_URI",
+        "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>",
+    );
     command
 }
 
