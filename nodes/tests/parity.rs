@@ -25,7 +25,7 @@ fn missions_over_dds_and_in_one_process_are_the_same() {
             let words = ["--planner", planner, "--seed", seed];
             let out = |kind: &str| folder.path().join(format!("{planner}-{seed}-{kind}"));
             let in_process = tasks(&mission, &out("in-process"), &[&words[..], &["--in-process"]].concat());
-            let over_dds = tasks(&mission, &out("dds"), &words);
+            let over_dds = tasks(&mission, &out("dds"), &[&words[..], &["--no-bag"]].concat());
             assert_eq!(over_dds, in_process, "planner {planner}, seed {seed}");
             assert!(in_process.lines().count() > 20);
         }
