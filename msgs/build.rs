@@ -41,10 +41,7 @@ fn generate() -> Result<(), String> {
 /// Our own package and the standard ones, with their folders.
 fn packages() -> Result<Vec<(String, PathBuf)>, String> {
     let mut packages = vec![("swath_msgs".to_owned(), PathBuf::from("."))];
-    for folder in entries(Path::new("standard"))?
-        .into_iter()
-        .filter(|path| path.is_dir())
-    {
+    for folder in entries(Path::new("standard"))?.into_iter().filter(|path| path.is_dir()) {
         packages.push((stem(&folder), folder));
     }
     Ok(packages)
@@ -84,18 +81,13 @@ fn read_package(
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
-    let read = || -> io::Result<Vec<PathBuf>> {
-        fs::read_dir(folder)?
-            .map(|entry| entry.map(|entry| entry.path()))
-            .collect()
-    };
+    let read =
+        || -> io::Result<Vec<PathBuf>> { fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path())).collect() };
     let mut paths = read().map_err(|error| format!("{}: {error}", folder.display()))?;
     paths.sort();
     Ok(paths)
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem()
-        .map(|stem| stem.to_string_lossy().into_owned())
-        .unwrap_or_default()
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }

@@ -11,8 +11,7 @@ use crate::model::{Base, Field, Message, Primitive, Service, Shape};
 pub type Catalogue = BTreeMap<String, Message>;
 
 /// The line that a bag's schema text has before each dependency.
-const RULE: &str =
-    "================================================================================";
+const RULE: &str = "================================================================================";
 
 /// Names of the types that the message is made of, itself not included, at any depth.
 pub fn dependencies(catalogue: &Catalogue, message: &Message) -> Result<BTreeSet<String>, String> {
@@ -24,12 +23,9 @@ pub fn dependencies(catalogue: &Catalogue, message: &Message) -> Result<BTreeSet
                 continue;
             };
             let nested_name = nested_type_name(package, name);
-            let nested = catalogue.get(&nested_name).ok_or_else(|| {
-                format!(
-                    "{}: the type {nested_name} is not known",
-                    message.type_name()
-                )
-            })?;
+            let nested = catalogue
+                .get(&nested_name)
+                .ok_or_else(|| format!("{}: the type {nested_name} is not known", message.type_name()))?;
             if path.contains(&nested_name) {
                 return Err(format!("{nested_name} contains itself"));
             }
@@ -67,18 +63,14 @@ pub fn message_hash(catalogue: &Catalogue, message: &Message) -> Result<String, 
             (name, description)
         })
         .collect();
-    Ok(hash(
-        &description(&message.type_name(), &message.fields),
-        &referenced,
-    ))
+    Ok(hash(&description(&message.type_name(), &message.fields), &referenced))
 }
 
 /// Type hash of a service, which covers its request, response and event types.
 pub fn service_hash(catalogue: &Catalogue, service: &Service) -> Result<String, String> {
     let name = format!("{}/srv/{}", service.package, service.name);
     let half = |suffix| nested_json(&format!("{name}_{suffix}"));
-    let member =
-        |field: &str, type_json: &str| format!(r#"{{"name": "{field}", "type": {type_json}}}"#);
+    let member = |field: &str, type_json: &str| format!(r#"{{"name": "{field}", "type": {type_json}}}"#);
     let event_info = "service_msgs/msg/ServiceEventInfo";
     let event = [
         member("info", &nested_json(event_info)(1, 0)),
@@ -90,25 +82,17 @@ pub fn service_hash(catalogue: &Catalogue, service: &Service) -> Result<String, 
         member("response_message", &half("Response")(1, 0)),
         member("event_message", &half("Event")(1, 0)),
     ];
-    let info = catalogue
-        .get(event_info)
-        .ok_or_else(|| format!("{name}: the type {event_info} is not known"))?;
+    let info = catalogue.get(event_info).ok_or_else(|| format!("{name}: the type {event_info} is not known"))?;
     let mut referenced = BTreeMap::new();
     for message in [&service.request, &service.response, info] {
-        referenced.insert(
-            message.type_name(),
-            description(&message.type_name(), &message.fields),
-        );
+        referenced.insert(message.type_name(), description(&message.type_name(), &message.fields));
         for dependency in dependencies(catalogue, message)? {
             let description = description(&dependency, &catalogue[&dependency].fields);
             referenced.insert(dependency, description);
         }
     }
     let event_name = format!("{name}_Event");
-    referenced.insert(
-        event_name.clone(),
-        description_of_members(&event_name, &event),
-    );
+    referenced.insert(event_name.clone(), description_of_members(&event_name, &event));
     Ok(hash(&description_of_members(&name, &whole), &referenced))
 }
 
@@ -134,24 +118,13 @@ fn hash(description: &str, referenced: &BTreeMap<String, String>) -> String {
 }
 
 fn description(type_name: &str, fields: &[Field]) -> String {
-    let members: Vec<String> = fields
-        .iter()
-        .map(|field| {
-            format!(
-                r#"{{"name": "{}", "type": {}}}"#,
-                field.name,
-                type_json(field)
-            )
-        })
-        .collect();
+    let members: Vec<String> =
+        fields.iter().map(|field| format!(r#"{{"name": "{}", "type": {}}}"#, field.name, type_json(field))).collect();
     description_of_members(type_name, &members)
 }
 
 fn description_of_members(type_name: &str, members: &[String]) -> String {
-    format!(
-        r#"{{"type_name": "{type_name}", "fields": [{}]}}"#,
-        members.join(", ")
-    )
+    format!(r#"{{"type_name": "{type_name}", "fields": [{}]}}"#, members.join(", "))
 }
 
 fn nested_json(type_name: &str) -> impl Fn(u8, usize) -> String + use<> {

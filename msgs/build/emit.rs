@@ -11,10 +11,7 @@ pub fn source(catalogue: &Catalogue, services: &[Service]) -> Result<String, Str
     let mut packages: Vec<&str> = catalogue.values().map(|m| m.package.as_str()).collect();
     packages.dedup();
     for package in packages {
-        let _ = writeln!(
-            out,
-            "/// The interfaces of the ROS 2 package `{package}`.\npub mod {package} {{"
-        );
+        let _ = writeln!(out, "/// The interfaces of the ROS 2 package `{package}`.\npub mod {package} {{");
         for message in catalogue.values().filter(|m| m.package == package) {
             emit_message(&mut out, catalogue, message)?;
         }
@@ -40,11 +37,7 @@ fn emit_message(out: &mut String, catalogue: &Catalogue, message: &Message) -> R
         format!("{}\n\n`{}`.", message.doc, message.type_name())
     };
     let has_defaults = message.fields.iter().any(|field| field.default.is_some());
-    let copy = if is_copy(catalogue, message) {
-        "Copy, "
-    } else {
-        ""
-    };
+    let copy = if is_copy(catalogue, message) { "Copy, " } else { "" };
     let default = if has_defaults { "" } else { "Default, " };
     let _ = writeln!(
         out,
@@ -82,9 +75,7 @@ fn emit_message(out: &mut String, catalogue: &Catalogue, message: &Message) -> R
 }
 
 fn emit_service(out: &mut String, catalogue: &Catalogue, service: &Service) -> Result<(), String> {
-    let Service {
-        package, name, doc, ..
-    } = service;
+    let Service { package, name, doc, .. } = service;
     let _ = writeln!(
         out,
         "#[doc = {:?}]
@@ -106,11 +97,7 @@ fn emit_service(out: &mut String, catalogue: &Catalogue, service: &Service) -> R
 }
 
 fn emit_default(out: &mut String, message: &Message) {
-    let _ = writeln!(
-        out,
-        "impl Default for {} {{ fn default() -> Self {{ Self {{",
-        rust_name(&message.name)
-    );
+    let _ = writeln!(out, "impl Default for {} {{ fn default() -> Self {{ Self {{", rust_name(&message.name));
     for field in &message.fields {
         let value = match &field.default {
             Some(value) => literal(value, field.shape),
@@ -134,12 +121,7 @@ fn emit_constants(out: &mut String, name: &str, constants: &[Constant]) {
                 (base_type(&base), literal(value, Shape::Scalar))
             }
         };
-        let _ = writeln!(
-            out,
-            "#[doc = {:?}]\npub const {}: {rust} = {value};",
-            escaped(&constant.doc),
-            constant.name
-        );
+        let _ = writeln!(out, "#[doc = {:?}]\npub const {}: {rust} = {value};", escaped(&constant.doc), constant.name);
     }
     out.push_str("}\n");
 }
@@ -151,10 +133,7 @@ fn literal(value: &Value, shape: Shape) -> String {
         Value::Float(value) => format!("{value:?}"),
         Value::Text(text) => format!("{text:?}.to_owned()"),
         Value::List(values) => {
-            let values: Vec<String> = values
-                .iter()
-                .map(|value| literal(value, Shape::Scalar))
-                .collect();
+            let values: Vec<String> = values.iter().map(|value| literal(value, Shape::Scalar)).collect();
             let list = values.join(", ");
             match shape {
                 Shape::Array(_) => format!("[{list}]"),
@@ -212,9 +191,9 @@ fn is_copy(catalogue: &Catalogue, message: &Message) -> bool {
         matches!(field.shape, Shape::Scalar | Shape::Array(_))
             && match &field.base {
                 Base::Primitive(primitive) => !matches!(primitive, Primitive::String { .. }),
-                Base::Nested { package, name } => catalogue
-                    .get(&format!("{package}/msg/{name}"))
-                    .is_some_and(|nested| is_copy(catalogue, nested)),
+                Base::Nested { package, name } => {
+                    catalogue.get(&format!("{package}/msg/{name}")).is_some_and(|nested| is_copy(catalogue, nested))
+                }
             }
     })
 }
@@ -230,7 +209,5 @@ fn rust_name(name: &str) -> String {
 
 /// Keeps rustdoc from reading units in brackets as links.
 fn escaped(doc: &str) -> String {
-    doc.replace('[', "\\[")
-        .replace(']', "\\]")
-        .replace('<', "\\<")
+    doc.replace('[', "\\[").replace(']', "\\]").replace('<', "\\<")
 }

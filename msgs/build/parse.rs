@@ -19,10 +19,7 @@ pub fn message(package: &str, name: &str, text: &str) -> Result<Message, String>
 pub fn service(package: &str, name: &str, text: &str) -> Result<Service, String> {
     check_type_name(name)?;
     let lines: Vec<&str> = text.lines().collect();
-    let mut rules = lines
-        .iter()
-        .enumerate()
-        .filter(|(_, line)| line.trim() == "---");
+    let mut rules = lines.iter().enumerate().filter(|(_, line)| line.trim() == "---");
     let (Some((rule, _)), None) = (rules.next(), rules.next()) else {
         return Err("a service needs exactly one line `---`".to_owned());
     };
@@ -36,13 +33,7 @@ pub fn service(package: &str, name: &str, text: &str) -> Result<Service, String>
     };
     let request = half(&lines[..rule], 0, "Request")?;
     let response = half(&lines[rule + 1..], rule + 1, "Response")?;
-    Ok(Service {
-        package: package.to_owned(),
-        name: name.to_owned(),
-        doc: request.doc.clone(),
-        request,
-        response,
-    })
+    Ok(Service { package: package.to_owned(), name: name.to_owned(), doc: request.doc.clone(), request, response })
 }
 
 fn definition(package: &str, text: &str, lines_before: usize) -> Result<Message, String> {
@@ -73,13 +64,10 @@ fn definition(package: &str, text: &str, lines_before: usize) -> Result<Message,
         }
         comment.extend(remark);
         let doc = std::mem::take(&mut comment).join(" ");
-        let name = member(&mut message, code, doc)
-            .map_err(|error| format!("line {}: {error}", lines_before + index + 1))?;
+        let name =
+            member(&mut message, code, doc).map_err(|error| format!("line {}: {error}", lines_before + index + 1))?;
         if !names.insert(name.clone()) {
-            return Err(format!(
-                "line {}: `{name}` is defined twice",
-                lines_before + index + 1
-            ));
+            return Err(format!("line {}: `{name}` is defined twice", lines_before + index + 1));
         }
     }
     if message.fields.is_empty() {
@@ -115,18 +103,11 @@ fn split_comment(line: &str) -> (&str, Option<&str>) {
 
 /// Parses `TYPE NAME`, `TYPE NAME DEFAULT` or `TYPE NAME=VALUE` and returns the name.
 fn member(message: &mut Message, code: &str, doc: String) -> Result<String, String> {
-    let (type_text, rest) = code
-        .split_once(char::is_whitespace)
-        .ok_or_else(|| format!("`{code}` has no name"))?;
+    let (type_text, rest) = code.split_once(char::is_whitespace).ok_or_else(|| format!("`{code}` has no name"))?;
     let (base, shape) = field_type(&message.package, type_text)?;
     let rest = rest.trim();
-    let name_length = rest
-        .find(|c: char| !c.is_ascii_alphanumeric() && c != '_')
-        .unwrap_or(rest.len());
-    let (name, tail) = (
-        rest[..name_length].to_owned(),
-        rest[name_length..].trim_start(),
-    );
+    let name_length = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
+    let (name, tail) = (rest[..name_length].to_owned(), rest[name_length..].trim_start());
     if doc.is_empty() {
         return Err(format!("`{name}` has no comment that says what it is"));
     }
@@ -136,25 +117,14 @@ fn member(message: &mut Message, code: &str, doc: String) -> Result<String, Stri
             return Err(format!("the constant `{name}` is not of a primitive type"));
         };
         let value = scalar(primitive, value_text.trim())?;
-        message.constants.push(Constant {
-            name: name.clone(),
-            primitive,
-            value,
-            doc,
-        });
+        message.constants.push(Constant { name: name.clone(), primitive, value, doc });
     } else {
         check_field_name(&name)?;
         let default = match tail {
             "" => None,
             text => Some(default_value(&base, shape, text)?),
         };
-        message.fields.push(Field {
-            name: name.clone(),
-            base,
-            shape,
-            default,
-            doc,
-        });
+        message.fields.push(Field { name: name.clone(), base, shape, default, doc });
     }
     Ok(name)
 }
@@ -172,9 +142,7 @@ fn field_type(package: &str, text: &str) -> Result<(Base, Shape), String> {
 }
 
 fn array_shape(text: &str, bracket: &str) -> Result<Shape, String> {
-    let size = bracket
-        .strip_suffix(']')
-        .ok_or_else(|| format!("`{text}` is not a type"))?;
+    let size = bracket.strip_suffix(']').ok_or_else(|| format!("`{text}` is not a type"))?;
     let positive = |digits: &str| match digits.parse::<usize>() {
         Ok(size) if size > 0 => Ok(size),
         _ => Err(format!("`{text}` has no positive array size")),
@@ -183,9 +151,9 @@ fn array_shape(text: &str, bracket: &str) -> Result<Shape, String> {
         _ if size.is_empty() => Ok(Shape::Unbounded),
         Some(bound) => Ok(Shape::Bounded(positive(bound)?)),
         None => match positive(size)? {
-            length if length > LONGEST_ARRAY => Err(format!(
-                "`{text}` is longer than the {LONGEST_ARRAY} elements that are supported"
-            )),
+            length if length > LONGEST_ARRAY => {
+                Err(format!("`{text}` is longer than the {LONGEST_ARRAY} elements that are supported"))
+            }
             length => Ok(Shape::Array(length)),
         },
     }
@@ -212,11 +180,7 @@ fn primitive(text: &str) -> Result<Option<Primitive>, String> {
         }
         _ => match text.strip_prefix("string<=") {
             Some(bound) => Primitive::String {
-                bound: Some(
-                    bound
-                        .parse()
-                        .map_err(|_| format!("`{text}` has no bound that is a number"))?,
-                ),
+                bound: Some(bound.parse().map_err(|_| format!("`{text}` has no bound that is a number"))?),
             },
             None => return Ok(None),
         },
@@ -231,10 +195,7 @@ fn nested(package: &str, text: &str) -> Result<Base, String> {
         _ => return Err(format!("`{text}` is not a type")),
     };
     check_type_name(name)?;
-    Ok(Base::Nested {
-        package: package.to_owned(),
-        name: name.to_owned(),
-    })
+    Ok(Base::Nested { package: package.to_owned(), name: name.to_owned() })
 }
 
 fn default_value(base: &Base, shape: Shape, text: &str) -> Result<Value, String> {
@@ -254,14 +215,12 @@ fn default_value(base: &Base, shape: Shape, text: &str) -> Result<Value, String>
         .map(|item| scalar(primitive, item.trim()))
         .collect::<Result<Vec<_>, _>>()?;
     match shape {
-        Shape::Array(length) if values.len() != length => Err(format!(
-            "the default has {} values for {length}",
-            values.len()
-        )),
-        Shape::Bounded(bound) if values.len() > bound => Err(format!(
-            "the default has {} values for at most {bound}",
-            values.len()
-        )),
+        Shape::Array(length) if values.len() != length => {
+            Err(format!("the default has {} values for {length}", values.len()))
+        }
+        Shape::Bounded(bound) if values.len() > bound => {
+            Err(format!("the default has {} values for at most {bound}", values.len()))
+        }
         _ => Ok(Value::List(values)),
     }
 }
@@ -313,10 +272,7 @@ fn integer(text: &str) -> Option<i128> {
 
 fn unquoted(text: &str) -> &str {
     for quote in ['"', '\''] {
-        if let Some(inner) = text
-            .strip_prefix(quote)
-            .and_then(|text| text.strip_suffix(quote))
-        {
+        if let Some(inner) = text.strip_prefix(quote).and_then(|text| text.strip_suffix(quote)) {
             return inner;
         }
     }
@@ -324,39 +280,22 @@ fn unquoted(text: &str) -> &str {
 }
 
 fn check_type_name(name: &str) -> Result<(), String> {
-    let valid = name.starts_with(|c: char| c.is_ascii_uppercase())
-        && name.chars().all(|c| c.is_ascii_alphanumeric());
-    if valid {
-        Ok(())
-    } else {
-        Err(format!("`{name}` is not a name for a type"))
-    }
+    let valid = name.starts_with(|c: char| c.is_ascii_uppercase()) && name.chars().all(|c| c.is_ascii_alphanumeric());
+    if valid { Ok(()) } else { Err(format!("`{name}` is not a name for a type")) }
 }
 
 fn check_field_name(name: &str) -> Result<(), String> {
     let valid = name.starts_with(|c: char| c.is_ascii_lowercase())
-        && name
-            .chars()
-            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
         && !name.contains("__")
         && !name.ends_with('_');
-    if valid {
-        Ok(())
-    } else {
-        Err(format!("`{name}` is not a name for a field"))
-    }
+    if valid { Ok(()) } else { Err(format!("`{name}` is not a name for a field")) }
 }
 
 fn check_constant_name(name: &str) -> Result<(), String> {
     let valid = name.starts_with(|c: char| c.is_ascii_uppercase())
-        && name
-            .chars()
-            .all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_')
+        && name.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_')
         && !name.contains("__")
         && !name.ends_with('_');
-    if valid {
-        Ok(())
-    } else {
-        Err(format!("`{name}` is not a name for a constant"))
-    }
+    if valid { Ok(()) } else { Err(format!("`{name}` is not a name for a constant")) }
 }

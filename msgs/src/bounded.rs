@@ -8,10 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub(crate) struct Sequence<const N: usize>;
 
 impl<const N: usize> Sequence<N> {
-    pub(crate) fn serialize<T: Serialize, S: Serializer>(
-        values: &[T],
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<T: Serialize, S: Serializer>(values: &[T], serializer: S) -> Result<S::Ok, S::Error> {
         check::<N>(values.len()).map_err(S::Error::custom)?;
         values.serialize(serializer)
     }
@@ -34,9 +31,7 @@ impl<const N: usize> Text<N> {
         text.serialize(serializer)
     }
 
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<String, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
         let text = String::deserialize(deserializer)?;
         check::<N>(text.len()).map_err(D::Error::custom)?;
         Ok(text)

@@ -69,18 +69,12 @@ pub struct Interface {
 impl Interface {
     /// The interface of a message type.
     pub const fn of<M: RosMessage>() -> Self {
-        Self {
-            type_name: M::TYPE_NAME,
-            type_hash: M::TYPE_HASH,
-            schema: M::SCHEMA,
-        }
+        Self { type_name: M::TYPE_NAME, type_hash: M::TYPE_HASH, schema: M::SCHEMA }
     }
 
     /// The interface with this full name, such as `std_msgs/msg/Header`, if it is one of ours.
     pub fn find(type_name: &str) -> Option<&'static Self> {
-        let index = MESSAGES
-            .binary_search_by(|known| known.type_name.cmp(type_name))
-            .ok()?;
+        let index = MESSAGES.binary_search_by(|known| known.type_name.cmp(type_name)).ok()?;
         Some(&MESSAGES[index])
     }
 

@@ -28,161 +28,55 @@ fn every_kind_of_member_is_read() {
                 string NAME = \"a b\" # Sixth.\nbool e true # Seventh.\n";
     let message = parse::message("pkg", "Whole", text).unwrap();
     assert_eq!(message.doc, "About it.");
-    let fields: Vec<_> = message
-        .fields
-        .iter()
-        .map(|f| {
-            (
-                f.name.as_str(),
-                &f.base,
-                f.shape,
-                f.default.clone(),
-                f.doc.as_str(),
-            )
-        })
-        .collect();
-    let nested = |package: &str, name: &str| Base::Nested {
-        package: package.to_owned(),
-        name: name.to_owned(),
-    };
-    let list = Value::List(vec![
-        Value::Float(1.0),
-        Value::Float(2.5),
-        Value::Float(-3.0),
-    ]);
+    let fields: Vec<_> =
+        message.fields.iter().map(|f| (f.name.as_str(), &f.base, f.shape, f.default.clone(), f.doc.as_str())).collect();
+    let nested = |package: &str, name: &str| Base::Nested { package: package.to_owned(), name: name.to_owned() };
+    let list = Value::List(vec![Value::Float(1.0), Value::Float(2.5), Value::Float(-3.0)]);
     let text_base = Base::Primitive(Primitive::String { bound: Some(5) });
     assert_eq!(
         fields,
         [
-            (
-                "a",
-                &Base::Primitive(Primitive::Float64),
-                Shape::Array(3),
-                Some(list),
-                "First."
-            ),
-            (
-                "b",
-                &text_base,
-                Shape::Scalar,
-                Some(Value::Text("x#y".to_owned())),
-                "Second."
-            ),
-            (
-                "c",
-                &nested("pkg", "Thing"),
-                Shape::Bounded(2),
-                None,
-                "Third."
-            ),
-            (
-                "d",
-                &nested("other", "Part"),
-                Shape::Unbounded,
-                None,
-                "Fourth."
-            ),
-            (
-                "e",
-                &Base::Primitive(Primitive::Bool),
-                Shape::Scalar,
-                Some(Value::Bool(true)),
-                "Seventh."
-            ),
+            ("a", &Base::Primitive(Primitive::Float64), Shape::Array(3), Some(list), "First."),
+            ("b", &text_base, Shape::Scalar, Some(Value::Text("x#y".to_owned())), "Second."),
+            ("c", &nested("pkg", "Thing"), Shape::Bounded(2), None, "Third."),
+            ("d", &nested("other", "Part"), Shape::Unbounded, None, "Fourth."),
+            ("e", &Base::Primitive(Primitive::Bool), Shape::Scalar, Some(Value::Bool(true)), "Seventh."),
         ]
     );
-    let constants: Vec<_> = message
-        .constants
-        .iter()
-        .map(|c| (c.name.as_str(), c.value.clone()))
-        .collect();
-    assert_eq!(
-        constants,
-        [
-            ("LIMIT", Value::Int(16)),
-            ("NAME", Value::Text("a b".to_owned()))
-        ]
-    );
+    let constants: Vec<_> = message.constants.iter().map(|c| (c.name.as_str(), c.value.clone())).collect();
+    assert_eq!(constants, [("LIMIT", Value::Int(16)), ("NAME", Value::Text("a b".to_owned()))]);
 }
 
 #[test]
 fn bad_definitions_are_refused_with_line_and_reason() {
     let refused = |text: &str| parse::message("pkg", "Bad", text).unwrap_err();
     for (line, reason) in [
-        (
-            "wstring a # A.",
-            "line 1: `wstring` is not supported: use `string`",
-        ),
-        (
-            "float64 a",
-            "line 1: `a` has no comment that says what it is",
-        ),
-        (
-            "float64[99] a # A.",
-            "line 1: `float64[99]` is longer than the 32 elements that are supported",
-        ),
-        (
-            "float64[0] a # A.",
-            "line 1: `float64[0]` has no positive array size",
-        ),
+        ("wstring a # A.", "line 1: `wstring` is not supported: use `string`"),
+        ("float64 a", "line 1: `a` has no comment that says what it is"),
+        ("float64[99] a # A.", "line 1: `float64[99]` is longer than the 32 elements that are supported"),
+        ("float64[0] a # A.", "line 1: `float64[0]` has no positive array size"),
         ("float64[3 a # A.", "line 1: `float64[3` is not a type"),
         ("uint8 a 256 # A.", "line 1: `256` is not a value of Uint8"),
         ("uint8 A = -1 # A.", "line 1: `-1` is not a value of Uint8"),
-        (
-            "float64 a NaN # A.",
-            "line 1: `NaN` is not a value of Float64",
-        ),
-        (
-            "bool a maybe # A.",
-            "line 1: `maybe` is not a value of Bool",
-        ),
-        (
-            "string<=2 a abc # A.",
-            "line 1: `abc` is not a value of String { bound: Some(2) }",
-        ),
-        (
-            "string<=x a # A.",
-            "line 1: `string<=x` has no bound that is a number",
-        ),
-        (
-            "int32[2] a [1] # A.",
-            "line 1: the default has 1 values for 2",
-        ),
+        ("float64 a NaN # A.", "line 1: `NaN` is not a value of Float64"),
+        ("bool a maybe # A.", "line 1: `maybe` is not a value of Bool"),
+        ("string<=2 a abc # A.", "line 1: `abc` is not a value of String { bound: Some(2) }"),
+        ("string<=x a # A.", "line 1: `string<=x` has no bound that is a number"),
+        ("int32[2] a [1] # A.", "line 1: the default has 1 values for 2"),
         ("int32[] a 1 # A.", "line 1: the default `1` is not a list"),
-        (
-            "Thing a 1 # A.",
-            "line 1: a nested type cannot have the default `1`",
-        ),
-        (
-            "Thing A = 1 # A.",
-            "line 1: the constant `A` is not of a primitive type",
-        ),
-        (
-            "float64 Upper # A.",
-            "line 1: `Upper` is not a name for a field",
-        ),
-        (
-            "float64 a__b # A.",
-            "line 1: `a__b` is not a name for a field",
-        ),
-        (
-            "uint8 lower=1 # A.",
-            "line 1: `lower` is not a name for a constant",
-        ),
+        ("Thing a 1 # A.", "line 1: a nested type cannot have the default `1`"),
+        ("Thing A = 1 # A.", "line 1: the constant `A` is not of a primitive type"),
+        ("float64 Upper # A.", "line 1: `Upper` is not a name for a field"),
+        ("float64 a__b # A.", "line 1: `a__b` is not a name for a field"),
+        ("uint8 lower=1 # A.", "line 1: `lower` is not a name for a constant"),
         ("a/b/c/d x # A.", "line 1: `a/b/c/d` is not a type"),
         ("lonely # A.", "line 1: `lonely` has no name"),
         ("int8 a # A.\nint8 a # B.", "line 2: `a` is defined twice"),
     ] {
         assert_eq!(refused(line), reason);
     }
-    assert_eq!(
-        parse::message("pkg", "bad_name", "").unwrap_err(),
-        "`bad_name` is not a name for a type"
-    );
-    assert_eq!(
-        parse::service("pkg", "Call", "int8 a # A.").unwrap_err(),
-        "a service needs exactly one line `---`"
-    );
+    assert_eq!(parse::message("pkg", "bad_name", "").unwrap_err(), "`bad_name` is not a name for a type");
+    assert_eq!(parse::service("pkg", "Call", "int8 a # A.").unwrap_err(), "a service needs exactly one line `---`");
     assert_eq!(
         parse::service("pkg", "Call", "int8 a # A.\n---\nint8 b").unwrap_err(),
         "line 3: `b` has no comment that says what it is"
@@ -200,20 +94,14 @@ fn unknown_and_circular_types_are_refused() {
         describe::message_hash(&known, &known["pkg/msg/Loose"]).unwrap_err(),
         "pkg/msg/Loose: the type pkg/msg/Missing is not known"
     );
-    assert_eq!(
-        emit::source(&known, &[]).unwrap_err(),
-        "pkg/msg/Link contains itself"
-    );
+    assert_eq!(emit::source(&known, &[]).unwrap_err(), "pkg/msg/Link contains itself");
 }
 
 #[test]
 fn an_empty_half_of_a_service_gets_the_placeholder_member() {
     let service = parse::service("pkg", "Trigger", "---\nbool ok # Whether.").unwrap();
     assert_eq!(service.request.type_name(), "pkg/srv/Trigger_Request");
-    assert_eq!(
-        service.request.fields[0].name,
-        "structure_needs_at_least_one_member"
-    );
+    assert_eq!(service.request.fields[0].name, "structure_needs_at_least_one_member");
     assert_eq!(service.response.fields[0].name, "ok");
 }
 
@@ -221,16 +109,8 @@ fn an_empty_half_of_a_service_gets_the_placeholder_member() {
 #[test]
 fn service_hashes_are_those_of_ros_2() {
     let known = catalogue(&[
-        (
-            "builtin_interfaces",
-            "Time",
-            include_str!("../standard/builtin_interfaces/msg/Time.msg"),
-        ),
-        (
-            "service_msgs",
-            "ServiceEventInfo",
-            include_str!("../standard/service_msgs/msg/ServiceEventInfo.msg"),
-        ),
+        ("builtin_interfaces", "Time", include_str!("../standard/builtin_interfaces/msg/Time.msg")),
+        ("service_msgs", "ServiceEventInfo", include_str!("../standard/service_msgs/msg/ServiceEventInfo.msg")),
     ]);
     let text = "int64 a # A.\nint64 b # B.\n---\nint64 sum # Sum.\n";
     let service = parse::service("example_interfaces", "AddTwoInts", text).unwrap();
@@ -263,9 +143,6 @@ fn emitted_defaults_constants_and_bounds_are_rust() {
         "#[serde(with = \"crate::bounded::Text::<3>\")]\npub r#type: ::std::string::String,",
         "pub const D: &'static str = \"d\";",
     ] {
-        assert!(
-            source.contains(expected),
-            "{expected} is missing in\n{source}"
-        );
+        assert!(source.contains(expected), "{expected} is missing in\n{source}");
     }
 }
