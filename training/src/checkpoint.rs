@@ -106,6 +106,18 @@ pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerStat
     Ok(state)
 }
 
+/// The weights of a policy or checkpoint whose network and observation are those of `run`.
+///
+/// # Errors
+/// A file that is damaged, or whose network or environment has other settings.
+pub fn load_weights(path: &Path, run: &RunConfig, layout: &Layout) -> Result<Vec<f32>> {
+    let content = Content::read(path)?;
+    let found = header(&content, path)?.run;
+    let same_problem = RunConfig { network: found.network, environment: found.environment, ..run.clone() };
+    check_same_run(&same_problem, run, path)?;
+    flat_weights(&content, layout, path)
+}
+
 /// The header of a checkpoint or policy.
 pub fn header(content: &Content, path: &Path) -> Result<Header> {
     let header: Header = serde_json::from_str(&content.header).map_err(|error| TrainingError::damaged(path, error))?;

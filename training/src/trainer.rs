@@ -151,6 +151,17 @@ impl Trainer {
         Trainer::restore(run, device, state)
     }
 
+    /// Takes the weights of a policy or checkpoint of the same network and observation, and nothing else of it.
+    ///
+    /// # Errors
+    /// A file that is damaged or holds another network or observation.
+    pub fn adopt(&mut self, path: &Path) -> Result<()> {
+        let weights = checkpoint::load_weights(path, &self.run, &self.layout)?;
+        let flat = tch::Tensor::from_slice(&weights).to_device(self.parameters.flat.device());
+        self.parameters = Parameters::from_flat(&self.layout, flat)?;
+        Ok(())
+    }
+
     /// Clones the teacher's behaviour if the run asks for it; see [`warm_start::clone_teacher`].
     pub fn warm_start(&mut self) -> Result<Option<f64>> {
         let Some(config) = &self.run.warm_start else {

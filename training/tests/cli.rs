@@ -125,6 +125,25 @@ fn a_run_is_not_begun_over_another_one() {
 }
 
 #[test]
+fn a_run_can_begin_with_the_weights_of_a_policy_of_the_same_network() {
+    let case = Case::new(TOY);
+    succeeded(&case.train(&["--steps", "40"]));
+    std::fs::rename(case.path("out/toy-seed0/policy.safetensors"), case.path("policy.safetensors")).unwrap();
+    let begun = |seed: &str, more: &[&str]| {
+        succeeded(&case.train(&[&["--seed", seed, "--steps", "40", "--stop-after", "0"], more].concat()));
+        let path = case.path(&format!("out/toy-seed{seed}/policy.safetensors"));
+        swath_training::store::Content::read(&path).unwrap().tensors
+    };
+    let policy = swath_training::store::Content::read(&case.path("policy.safetensors")).unwrap().tensors;
+    assert_eq!(begun("1", &["--from", "policy.safetensors"]), policy);
+    assert_ne!(begun("2", &[]), policy);
+    let other = Case::new(&TOY.replace("encoder = [8]", "encoder = [9]"));
+    let policy = case.path("policy.safetensors");
+    let output = other.train(&["--from", policy.to_str().unwrap()]);
+    other.refused(&output, &["policy.safetensors was made by another run: network.encoder"]);
+}
+
+#[test]
 fn tensorboard_reads_the_event_files() {
     let venv = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python");
     let python = std::env::var_os("SWATH_PYTHON").map_or(venv, PathBuf::from);

@@ -45,6 +45,9 @@ pub struct TrainArgs {
     /// Go on from the newest checkpoint of the run's folder, or from a given one
     #[arg(long, value_name = "CHECKPOINT", num_args = 0..=1)]
     resume: Option<Option<PathBuf>>,
+    /// Begin with the weights of this policy or checkpoint instead of random ones
+    #[arg(long, value_name = "POLICY", conflicts_with = "resume")]
+    from: Option<PathBuf>,
     /// Save and leave after this many environment steps, as Ctrl-C would
     #[arg(long, value_name = "STEPS")]
     stop_after: Option<u64>,
@@ -61,7 +64,7 @@ pub fn train(args: &TrainArgs) -> Result<()> {
     let folder = Folder::new(args.out.join(format!("{}-seed{}", run.name, run.seed)));
     let mut trainer = match &args.resume {
         Some(from) => folder.resume(run, from.as_deref(), device)?,
-        None => folder.begin(run, device)?,
+        None => folder.begin(run, args.from.as_deref(), device)?,
     };
     let mut session = Session::new(&folder, &trainer)?;
     session.catch_signals().context("cannot catch Ctrl-C")?;
@@ -91,11 +94,14 @@ impl Folder {
         self.path.join("progress.jsonl")
     }
 
-    fn begin(&self, run: RunConfig, device: tch::Device) -> Result<Trainer> {
+    fn begin(&self, run: RunConfig, from: Option<&Path>, device: tch::Device) -> Result<Trainer> {
         if let Ok(checkpoint) = checkpoint::newest(&self.checkpoints()) {
             bail!("{} exists: go on with --resume, or choose another --out or seed", checkpoint.display());
         }
         let mut trainer = Trainer::new(run, device)?;
+        if let Some(policy) = from {
+            trainer.adopt(policy)?;
+        }
         fs::create_dir_all(self.checkpoints())
             .with_context(|| format!("cannot make {}", self.checkpoints().display()))?;
         let text = toml::to_string(trainer.run()).context("cannot write the run as TOML")?;
