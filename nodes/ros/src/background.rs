@@ -54,14 +54,8 @@ impl Background {
         let thread = std::thread::Builder::new()
             .name("ros".to_owned())
             .spawn(move || running.run(&listener, &announcements))
-            .map_err(|source| RosError::System {
-                what: "no thread for the node",
-                source,
-            })?;
-        Ok(Self {
-            shared,
-            thread: Some(thread),
-        })
+            .map_err(|source| RosError::System { what: "no thread for the node", source })?;
+        Ok(Self { shared, thread: Some(thread) })
     }
 
     /// From now on the thread answers for the parameters.

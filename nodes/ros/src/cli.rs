@@ -68,16 +68,8 @@ impl RosArgs {
         Ok((rest, args))
     }
 
-    fn option(
-        &mut self,
-        option: &str,
-        words: &mut impl Iterator<Item = String>,
-    ) -> Result<(), RosError> {
-        let mut value = || {
-            words
-                .next()
-                .ok_or_else(|| argument(option, "it needs a value after it"))
-        };
+    fn option(&mut self, option: &str, words: &mut impl Iterator<Item = String>) -> Result<(), RosError> {
+        let mut value = || words.next().ok_or_else(|| argument(option, "it needs a value after it"));
         match option {
             "-r" | "--remap" => self.remap(&value()?),
             "-p" | "--param" => self.parameter(&value()?),
@@ -110,11 +102,7 @@ impl RosArgs {
             Some((node, from)) => (Some(node.to_owned()), from),
             None => (None, from),
         };
-        self.remaps.push(Remap {
-            node,
-            from: from.to_owned(),
-            to: to.to_owned(),
-        });
+        self.remaps.push(Remap { node, from: from.to_owned(), to: to.to_owned() });
         Ok(())
     }
 
@@ -128,24 +116,15 @@ impl RosArgs {
             None => (Scope::Process, name),
         };
         let value = Value::from_text(text).map_err(|reason| argument(rule, &reason))?;
-        self.overrides.push(Override {
-            scope,
-            name: name.to_owned(),
-            value,
-        });
+        self.overrides.push(Override { scope, name: name.to_owned(), value });
         Ok(())
     }
 
     fn parameter_file(&mut self, path: &Path) -> Result<(), RosError> {
-        let failed = |reason: String| RosError::ParameterFile {
-            path: path.display().to_string(),
-            reason,
-        };
+        let failed = |reason: String| RosError::ParameterFile { path: path.display().to_string(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-        let yaml: Yaml =
-            serde_yaml_ng::from_str(&text).map_err(|error| failed(error.to_string()))?;
-        self.overrides
-            .extend(read_nodes("", &yaml).map_err(failed)?);
+        let yaml: Yaml = serde_yaml_ng::from_str(&text).map_err(|error| failed(error.to_string()))?;
+        self.overrides.extend(read_nodes("", &yaml).map_err(failed)?);
         Ok(())
     }
 
@@ -160,10 +139,7 @@ impl RosArgs {
             "warn" | "warning" => Level::WARN,
             "error" | "fatal" => Level::ERROR,
             _ => {
-                return Err(argument(
-                    text,
-                    "a log level is one of debug, info, warn, error and fatal",
-                ));
+                return Err(argument(text, "a log level is one of debug, info, warn, error and fatal"));
             }
         };
         self.log_levels.push((logger, level));
@@ -172,17 +148,10 @@ impl RosArgs {
 
     /// The names of the node that the program calls `name` and puts into `namespace`.
     pub fn names(&self, namespace: &str, name: &str) -> Result<Names, RosError> {
-        let mine: Vec<&Remap> = self
-            .remaps
-            .iter()
-            .filter(|rule| rule.node.as_deref().is_none_or(|n| n == name))
-            .collect();
-        let last = |keys: &[&str]| {
-            mine.iter()
-                .rev()
-                .find(|rule| keys.contains(&rule.from.as_str()))
-                .map(|rule| &*rule.to)
-        };
+        let mine: Vec<&Remap> =
+            self.remaps.iter().filter(|rule| rule.node.as_deref().is_none_or(|n| n == name)).collect();
+        let last =
+            |keys: &[&str]| mine.iter().rev().find(|rule| keys.contains(&rule.from.as_str())).map(|rule| &*rule.to);
         let namespace = last(&["__ns"]).unwrap_or(namespace);
         let new_name = last(&["__node", "__name"]).unwrap_or(name);
         let topics: Vec<(String, String)> = mine
@@ -191,10 +160,7 @@ impl RosArgs {
             .map(|rule| (rule.from.clone(), rule.to.clone()))
             .collect();
         if !namespace.starts_with('/') {
-            return Err(RosError::Name {
-                name: namespace.to_owned(),
-                reason: "a namespace starts with a slash",
-            });
+            return Err(RosError::Name { name: namespace.to_owned(), reason: "a namespace starts with a slash" });
         }
         Names::new(namespace, new_name, &topics)
     }
@@ -220,18 +186,11 @@ impl RosArgs {
 
     /// The least severe level that a node logs.
     pub fn log_level_of(&self, names: &Names) -> Level {
-        let dotted = names
-            .fully_qualified()
-            .trim_start_matches('/')
-            .replace('/', ".");
+        let dotted = names.fully_qualified().trim_start_matches('/').replace('/', ".");
         self.log_levels
             .iter()
             .rev()
-            .find(|(logger, _)| {
-                logger
-                    .as_deref()
-                    .is_none_or(|logger| logger == dotted || logger == names.name())
-            })
+            .find(|(logger, _)| logger.as_deref().is_none_or(|logger| logger == dotted || logger == names.name()))
             .map_or(Level::INFO, |(_, level)| *level)
     }
 
@@ -259,12 +218,8 @@ impl Scope {
 fn matches(pattern: &[&str], parts: &[&str]) -> bool {
     match (pattern.split_first(), parts.split_first()) {
         (None, None) => true,
-        (Some((&"**", rest)), _) => {
-            (0..=parts.len()).any(|skipped| matches(rest, &parts[skipped..]))
-        }
-        (Some((token, pattern)), Some((part, parts))) => {
-            (*token == "*" || token == part) && matches(pattern, parts)
-        }
+        (Some((&"**", rest)), _) => (0..=parts.len()).any(|skipped| matches(rest, &parts[skipped..])),
+        (Some((token, pattern)), Some((part, parts))) => (*token == "*" || token == part) && matches(pattern, parts),
         _ => false,
     }
 }
@@ -276,9 +231,7 @@ fn read_nodes(path: &str, yaml: &Yaml) -> Result<Vec<Override>, String> {
     };
     let mut found = Vec::new();
     for (key, value) in entries {
-        let key = key
-            .as_str()
-            .ok_or_else(|| format!("a key under `{path}` is not a text"))?;
+        let key = key.as_str().ok_or_else(|| format!("a key under `{path}` is not a text"))?;
         if key == "ros__parameters" {
             read_parameters(path, "", value, &mut found)?;
         } else {
@@ -289,43 +242,25 @@ fn read_nodes(path: &str, yaml: &Yaml) -> Result<Vec<Override>, String> {
     Ok(found)
 }
 
-fn read_parameters(
-    node: &str,
-    prefix: &str,
-    yaml: &Yaml,
-    found: &mut Vec<Override>,
-) -> Result<(), String> {
+fn read_parameters(node: &str, prefix: &str, yaml: &Yaml, found: &mut Vec<Override>) -> Result<(), String> {
     let Yaml::Mapping(entries) = yaml else {
         return Err(format!("ros__parameters of `{node}` is not a mapping"));
     };
     for (key, value) in entries {
-        let key = key
-            .as_str()
-            .ok_or_else(|| format!("a parameter of `{node}` has no name"))?;
-        let name = if prefix.is_empty() {
-            key.to_owned()
-        } else {
-            format!("{prefix}.{key}")
-        };
+        let key = key.as_str().ok_or_else(|| format!("a parameter of `{node}` has no name"))?;
+        let name = if prefix.is_empty() { key.to_owned() } else { format!("{prefix}.{key}") };
         if value.is_mapping() {
             read_parameters(node, &name, value, found)?;
         } else {
             let value = Value::from_yaml(value).map_err(|reason| format!("`{name}`: {reason}"))?;
-            found.push(Override {
-                scope: Scope::Pattern(node.to_owned()),
-                name,
-                value,
-            });
+            found.push(Override { scope: Scope::Pattern(node.to_owned()), name, value });
         }
     }
     Ok(())
 }
 
 fn argument(argument: &str, reason: &str) -> RosError {
-    RosError::Argument {
-        argument: argument.to_owned(),
-        reason: reason.to_owned(),
-    }
+    RosError::Argument { argument: argument.to_owned(), reason: reason.to_owned() }
 }
 
 #[cfg(test)]
@@ -342,8 +277,7 @@ mod tests {
 
     #[test]
     fn own_words_are_left_to_the_program() {
-        let (rest, args) =
-            split("fly --seed 1 --ros-args -p pace:=1.0 -- --verbose --ros-args -p a:=2").unwrap();
+        let (rest, args) = split("fly --seed 1 --ros-args -p pace:=1.0 -- --verbose --ros-args -p a:=2").unwrap();
         assert_eq!(rest, ["fly", "--seed", "1", "--verbose"]);
         let names = args.names("/swath", "spacecraft").unwrap();
         let expected = [("a", Value::Integer(2)), ("pace", Value::Double(1.0))];
@@ -362,9 +296,7 @@ mod tests {
 
     #[test]
     fn rules_for_another_node_are_passed_over() {
-        let args = args(
-            "--ros-args -r guidance:__ns:=/g -r guidance:a:=b -p guidance:x:=1 -p spacecraft:x:=2",
-        );
+        let args = args("--ros-args -r guidance:__ns:=/g -r guidance:a:=b -p guidance:x:=1 -p spacecraft:x:=2");
         let names = args.names("/swath", "spacecraft").unwrap();
         assert_eq!(names.fully_qualified(), "/swath/spacecraft");
         assert_eq!(names.resolve("a").unwrap(), "/swath/a");
@@ -376,10 +308,7 @@ mod tests {
     fn log_levels_are_general_or_for_a_logger() {
         let names = Names::new("/swath", "spacecraft", &[]).unwrap();
         assert_eq!(RosArgs::default().log_level_of(&names), Level::INFO);
-        assert_eq!(
-            args("--ros-args --log-level WARN").log_level_of(&names),
-            Level::WARN
-        );
+        assert_eq!(args("--ros-args --log-level WARN").log_level_of(&names), Level::WARN);
         let named = args("--ros-args --log-level warn --log-level swath.spacecraft:=debug");
         assert_eq!(named.log_level_of(&names), Level::DEBUG);
         let other = args("--ros-args --log-level guidance:=debug");
@@ -390,26 +319,11 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said() {
         for (line, error) in [
-            (
-                "--ros-args -x",
-                "ros argument `-x`: it is not an option of --ros-args",
-            ),
-            (
-                "--ros-args -p",
-                "ros argument `-p`: it needs a value after it",
-            ),
-            (
-                "--ros-args -p pace=1",
-                "ros argument `pace=1`: a parameter is written name:=value",
-            ),
-            (
-                "--ros-args -p pace:=",
-                "ros argument `pace:=`: it has no value",
-            ),
-            (
-                "--ros-args -r a:=",
-                "ros argument `a:=`: a remapping is written from:=to",
-            ),
+            ("--ros-args -x", "ros argument `-x`: it is not an option of --ros-args"),
+            ("--ros-args -p", "ros argument `-p`: it needs a value after it"),
+            ("--ros-args -p pace=1", "ros argument `pace=1`: a parameter is written name:=value"),
+            ("--ros-args -p pace:=", "ros argument `pace:=`: it has no value"),
+            ("--ros-args -r a:=", "ros argument `a:=`: a remapping is written from:=to"),
             (
                 "--ros-args --log-level loud",
                 "ros argument `loud`: a log level is one of debug, info, warn, error and fatal",
@@ -418,19 +332,11 @@ mod tests {
             assert_eq!(split(line).unwrap_err().to_string(), error);
         }
         assert_eq!(
-            args("--ros-args -r __ns:=swath")
-                .names("/", "a")
-                .unwrap_err()
-                .to_string(),
+            args("--ros-args -r __ns:=swath").names("/", "a").unwrap_err().to_string(),
             "`swath` is not a valid name: a namespace starts with a slash"
         );
-        let missing = split("--ros-args --params-file /no/such.yaml")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            missing.starts_with("parameter file /no/such.yaml: "),
-            "{missing}"
-        );
+        let missing = split("--ros-args --params-file /no/such.yaml").unwrap_err().to_string();
+        assert!(missing.starts_with("parameter file /no/such.yaml: "), "{missing}");
     }
 
     #[test]
@@ -451,10 +357,7 @@ other:
   ros__parameters: {pace: 4.0}
 ";
         let overrides = read_nodes("", &serde_yaml_ng::from_str(yaml).unwrap()).unwrap();
-        let args = RosArgs {
-            overrides,
-            ..Default::default()
-        };
+        let args = RosArgs { overrides, ..Default::default() };
         let spacecraft = args.overrides(&Names::new("/swath", "spacecraft", &[]).unwrap());
         assert_eq!(spacecraft["pace"], Value::Double(2.0));
         assert_eq!(spacecraft["shared"], Value::String("all".to_owned()));
@@ -464,14 +367,8 @@ other:
         assert_eq!(guidance["pace"], Value::Double(3.0));
         assert_eq!(guidance.len(), 2);
         let bad: Yaml = serde_yaml_ng::from_str("a: {ros__parameters: {b: [1, x]}}").unwrap();
-        assert_eq!(
-            read_nodes("", &bad).unwrap_err(),
-            "`b`: the items of the list are not all of one type"
-        );
+        assert_eq!(read_nodes("", &bad).unwrap_err(), "`b`: the items of the list are not all of one type");
         let bad: Yaml = serde_yaml_ng::from_str("a: 1").unwrap();
-        assert_eq!(
-            read_nodes("", &bad).unwrap_err(),
-            "`a` is not a mapping of nodes"
-        );
+        assert_eq!(read_nodes("", &bad).unwrap_err(), "`a` is not a mapping of nodes");
     }
 }

@@ -31,10 +31,7 @@ impl SimClock {
 /// A time [ns since the mission epoch] as messages carry it; beyond 2^31 s it stands still.
 pub fn stamp(nanoseconds: u64) -> Time {
     let (sec, nanosec) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
-    Time {
-        sec: i32::try_from(sec).unwrap_or(i32::MAX),
-        nanosec: nanosec as u32,
-    }
+    Time { sec: i32::try_from(sec).unwrap_or(i32::MAX), nanosec: nanosec as u32 }
 }
 
 #[cfg(test)]
@@ -45,13 +42,7 @@ mod tests {
     fn time_is_split_into_seconds_and_nanoseconds() {
         let clock = SimClock::default();
         clock.clone().set_ns(1_500_000_000);
-        assert_eq!(
-            clock.stamp(),
-            Time {
-                sec: 1,
-                nanosec: 500_000_000
-            }
-        );
+        assert_eq!(clock.stamp(), Time { sec: 1, nanosec: 500_000_000 });
         assert_eq!(stamp(u64::MAX).sec, i32::MAX);
     }
 }

@@ -2,18 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::task::Waker;
+use std::task::{Wake, Waker};
 use std::time::Duration;
 
 use rustdds::bytes::Bytes;
 use rustdds::no_key::{
-    DataWriter, Decode, DefaultDecoder, DeserializedCacheChange, DeserializerAdapter,
-    SerializerAdapter, SimpleDataReader,
+    DataWriter, Decode, DefaultDecoder, DeserializedCacheChange, DeserializerAdapter, SerializerAdapter,
+    SimpleDataReader,
 };
-use rustdds::{
-    GUID, RTPSEntity as _, RepresentationIdentifier, SampleIdentity, Timestamp, WriteOptionsBuilder,
-};
+use rustdds::{GUID, RTPSEntity as _, RepresentationIdentifier, SampleIdentity, Timestamp, WriteOptionsBuilder};
 
 use crate::error::RosError;
 use crate::roster::{Direction, Roster};
@@ -39,23 +38,17 @@ impl Cdr {
 
     /// Takes bytes, header included.
     pub fn from_bytes(bytes: impl Into<Bytes>) -> Self {
-        Self {
-            bytes: bytes.into(),
-        }
+        Self { bytes: bytes.into() }
     }
 
     /// The bytes after the header, if they are little-endian plain CDR.
     pub(crate) fn little_endian(&self) -> Option<&[u8]> {
-        self.bytes
-            .strip_prefix(&LITTLE_ENDIAN[..2])
-            .and_then(|rest| rest.get(2..))
+        self.bytes.strip_prefix(&LITTLE_ENDIAN[..2]).and_then(|rest| rest.get(2..))
     }
 
     /// The bytes after the header, if they are big-endian plain CDR.
     pub(crate) fn big_endian(&self) -> Option<&[u8]> {
-        self.bytes
-            .strip_prefix(&BIG_ENDIAN[..2])
-            .and_then(|rest| rest.get(2..))
+        self.bytes.strip_prefix(&BIG_ENDIAN[..2]).and_then(|rest| rest.get(2..))
     }
 }
 
@@ -128,18 +121,12 @@ pub(crate) struct Copier;
 impl Decode<'_, Cdr> for Copier {
     type Error = Infallible;
 
-    fn decode_bytes(
-        self,
-        payload: &[u8],
-        encoding: RepresentationIdentifier,
-    ) -> Result<Cdr, Infallible> {
+    fn decode_bytes(self, payload: &[u8], encoding: RepresentationIdentifier) -> Result<Cdr, Infallible> {
         let [first, second] = encoding.to_bytes();
         let mut bytes = Vec::with_capacity(HEADER_LENGTH + payload.len());
         bytes.extend_from_slice(&[first, second, 0, 0]);
         bytes.extend_from_slice(payload);
-        Ok(Cdr {
-            bytes: bytes.into(),
-        })
+        Ok(Cdr { bytes: bytes.into() })
     }
 }
 
@@ -177,11 +164,7 @@ impl RawPublisher {
         self.send(cdr, None).map(|_| ())
     }
 
-    pub(crate) fn send(
-        &self,
-        cdr: Cdr,
-        related: Option<SampleIdentity>,
-    ) -> Result<SampleIdentity, RosError> {
+    pub(crate) fn send(&self, cdr: Cdr, related: Option<SampleIdentity>) -> Result<SampleIdentity, RosError> {
         if cdr.little_endian().is_none() {
             return Err(RosError::Send {
                 topic: self.topic.clone(),
@@ -194,17 +177,12 @@ impl RawPublisher {
         }
         self.writer
             .write_with_options(cdr, options.build())
-            .map_err(|error| RosError::Send {
-                topic: self.topic.clone(),
-                reason: error.to_string(),
-            })
+            .map_err(|error| RosError::Send { topic: self.topic.clone(), reason: error.to_string() })
     }
 
     /// Waits until every reliable reader has all samples, and tells whether that is so.
     pub fn flush(&self, timeout: Duration) -> bool {
-        self.writer
-            .wait_for_acknowledgments(timeout)
-            .unwrap_or(false)
+        self.writer.wait_for_acknowledgments(timeout).unwrap_or(false)
     }
 
     /// Readers that this writer sends to.
@@ -234,8 +212,32 @@ pub struct RawSubscription {
     reader: SimpleDataReader<Cdr, Adapter>,
     topic: String,
     roster: Arc<Roster>,
-    waker: Waker,
+    bell: Arc<Bell>,
     losses: Mutex<Losses>,
+}
+
+/// What DDS rings when a sample comes.
+struct Bell {
+    /// Nothing was there when DDS was last asked, and it has not rung since.
+    quiet: AtomicBool,
+    signal: Signal,
+}
+
+impl Wake for Bell {
+    fn wake(self: Arc<Self>) {
+        self.wake_by_ref();
+    }
+
+    fn wake_by_ref(self: &Arc<Self>) {
+        self.quiet.store(false, Ordering::Release);
+        self.signal.raise();
+    }
+}
+
+impl Bell {
+    fn new(signal: &Signal) -> Arc<Self> {
+        Arc::new(Self { quiet: AtomicBool::new(false), signal: signal.clone() })
+    }
 }
 
 impl RawSubscription {
@@ -245,35 +247,35 @@ impl RawSubscription {
         roster: Arc<Roster>,
         signal: &Signal,
     ) -> Self {
-        Self {
-            reader,
-            topic,
-            roster,
-            waker: signal.waker(),
-            losses: Mutex::default(),
-        }
+        Self { reader, topic, roster, bell: Bell::new(signal), losses: Mutex::default() }
     }
 
     /// The next sample, if there is one.
     ///
     /// Once it has returned nothing, the next sample to come raises the node's [`Signal`].
     pub fn take(&self) -> Result<Option<RawSample>, RosError> {
+        // A node that reads many topics asks them all whenever one has news: this makes it cheap.
+        if self.bell.quiet.load(Ordering::Acquire) {
+            return Ok(None);
+        }
         if let Some(sample) = self.try_take()? {
             return Ok(Some(sample));
         }
+        self.bell.quiet.store(true, Ordering::Release);
+        self.reader.set_waker(Some(Waker::from(Arc::clone(&self.bell))));
         // A sample may have come before the waker was set: look again.
-        self.reader.set_waker(Some(self.waker.clone()));
-        self.try_take()
+        let sample = self.try_take()?;
+        if sample.is_some() {
+            self.bell.quiet.store(false, Ordering::Release);
+        }
+        Ok(sample)
     }
 
     fn try_take(&self) -> Result<Option<RawSample>, RosError> {
         let sample = self
             .reader
             .try_take_one()
-            .map_err(|error| RosError::Receive {
-                topic: self.topic.clone(),
-                reason: error.to_string(),
-            })?;
+            .map_err(|error| RosError::Receive { topic: self.topic.clone(), reason: error.to_string() })?;
         Ok(sample.map(|change| {
             let sample = raw_sample(change);
             lock(&self.losses).note(&sample.info);
@@ -283,7 +285,7 @@ impl RawSubscription {
 
     /// From now on this subscription raises that signal and no longer the node's.
     pub fn set_signal(&mut self, signal: &Signal) {
-        self.waker = signal.waker();
+        self.bell = Bell::new(signal);
         signal.raise();
     }
 
@@ -337,10 +339,7 @@ fn raw_sample(change: DeserializedCacheChange<Cdr>) -> RawSample {
         sequence_number: change.sequence_number.into(),
         related: change.related_sample_identity(),
     };
-    RawSample {
-        cdr: change.into_value(),
-        info,
-    }
+    RawSample { cdr: change.into_value(), info }
 }
 
 /// Nanoseconds since 1970 of a time that DDS counts in 2^-32 s.
@@ -357,10 +356,7 @@ mod tests {
     #[test]
     fn times_are_exact_to_the_nanosecond() {
         assert_eq!(nanoseconds(Timestamp::from_ticks(1 << 32)), 1_000_000_000);
-        assert_eq!(
-            nanoseconds(Timestamp::from_ticks((5 << 32) + (1 << 31))),
-            5_500_000_000
-        );
+        assert_eq!(nanoseconds(Timestamp::from_ticks((5 << 32) + (1 << 31))), 5_500_000_000);
         // 2^-32 s is 0.23 ns: every nanosecond has a tick of its own.
         let one_ns = ((1_u64 << 32) / 1_000_000_000) + 1;
         assert_eq!(nanoseconds(Timestamp::from_ticks(one_ns)), 1);

@@ -38,11 +38,7 @@ impl Environment {
             Some(text) => match text.parse() {
                 Ok(domain) if domain <= DOMAIN_MAX => domain,
                 _ => {
-                    return Err(failed(
-                        "ROS_DOMAIN_ID",
-                        &text,
-                        "it is not a number from 0 to 232",
-                    ));
+                    return Err(failed("ROS_DOMAIN_ID", &text, "it is not a number from 0 to 232"));
                 }
             },
         };
@@ -61,17 +57,12 @@ impl Environment {
             }
         };
         let mapping = Mapping::for_middleware(set("RMW_IMPLEMENTATION").as_deref());
-        Ok(Self {
-            domain,
-            localhost_only: only || local,
-            mapping,
-        })
+        Ok(Self { domain, localhost_only: only || local, mapping })
     }
 
     /// The only networks to use, if not all.
     pub(crate) fn networks(&self) -> Option<[IpAddr; 1]> {
-        self.localhost_only
-            .then_some([IpAddr::V4(Ipv4Addr::LOCALHOST)])
+        self.localhost_only.then_some([IpAddr::V4(Ipv4Addr::LOCALHOST)])
     }
 }
 
@@ -80,20 +71,12 @@ mod tests {
     use super::*;
 
     fn read(set: &[(&str, &str)]) -> Result<Environment, RosError> {
-        Environment::from(|name| {
-            set.iter()
-                .find(|(known, _)| *known == name)
-                .map(|(_, value)| (*value).to_owned())
-        })
+        Environment::from(|name| set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned()))
     }
 
     #[test]
     fn unset_means_domain_0_everywhere_and_cyclone() {
-        let expected = Environment {
-            domain: 0,
-            localhost_only: false,
-            mapping: Mapping::Cyclone,
-        };
+        let expected = Environment { domain: 0, localhost_only: false, mapping: Mapping::Cyclone };
         assert_eq!(read(&[]).unwrap(), expected);
         assert_eq!(read(&[("ROS_DOMAIN_ID", "")]).unwrap(), expected);
     }
@@ -102,11 +85,7 @@ mod tests {
     fn variables_are_read_as_ros_reads_them() {
         assert_eq!(read(&[("ROS_DOMAIN_ID", "42")]).unwrap().domain, 42);
         assert!(read(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap().localhost_only);
-        assert!(
-            read(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")])
-                .unwrap()
-                .localhost_only
-        );
+        assert!(read(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]).unwrap().localhost_only);
         let fast = read(&[("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")]).unwrap();
         assert_eq!(fast.mapping, Mapping::Enhanced);
     }
@@ -120,10 +99,7 @@ mod tests {
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
         ] {
             let error = read(&[(name, value)]).unwrap_err().to_string();
-            assert!(
-                error.starts_with(&format!("environment variable {name}=`{value}`")),
-                "{error}"
-            );
+            assert!(error.starts_with(&format!("environment variable {name}=`{value}`")), "{error}");
         }
     }
 }

@@ -11,8 +11,8 @@ use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
-    Decision, DecisionPoint, GuidanceStatus, ImagingTask, RequestSummary, SpacecraftState,
-    StripRequest, StripStatus, SubmitStrips, UpcomingStrips, WheelTorque,
+    Decision, DecisionPoint, GuidanceStatus, ImagingTask, RequestSummary, SpacecraftState, StripRequest, StripStatus,
+    SubmitStrips, UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -79,130 +79,67 @@ impl<M: RosMessage> Topic<M> {
         writers: &'static [&'static str],
         readers: &'static [&'static str],
     ) -> Self {
-        let entry = Entry {
-            name,
-            type_name: M::TYPE_NAME,
-            profile,
-            writers,
-            readers,
-        };
-        Self {
-            entry,
-            message: PhantomData,
-        }
+        let entry = Entry { name, type_name: M::TYPE_NAME, profile, writers, readers };
+        Self { entry, message: PhantomData }
     }
 }
 
 impl<S: RosService> Service<S> {
     /// A service that is not in the table, such as one of a test.
-    pub const fn new(
-        name: &'static str,
-        writers: &'static [&'static str],
-        readers: &'static [&'static str],
-    ) -> Self {
+    pub const fn new(name: &'static str, writers: &'static [&'static str], readers: &'static [&'static str]) -> Self {
         let profile = Profile::Service;
-        let entry = Entry {
-            name,
-            type_name: S::TYPE_NAME,
-            profile,
-            writers,
-            readers,
-        };
-        Self {
-            entry,
-            service: PhantomData,
-        }
+        let entry = Entry { name, type_name: S::TYPE_NAME, profile, writers, readers };
+        Self { entry, service: PhantomData }
     }
 }
 
 /// Simulated time.
 pub const CLOCK: Topic<Clock> = Topic::new("/clock", Profile::Clock, &[SPACECRAFT], &[]);
 /// State of the spacecraft, each tick.
-pub const SPACECRAFT_STATE: Topic<SpacecraftState> = Topic::new(
-    "spacecraft/state",
-    Profile::State,
-    &[SPACECRAFT],
-    &[GUIDANCE],
-);
+pub const SPACECRAFT_STATE: Topic<SpacecraftState> =
+    Topic::new("spacecraft/state", Profile::State, &[SPACECRAFT], &[GUIDANCE]);
 /// Torque command, each tick.
-pub const WHEEL_TORQUE: Topic<WheelTorque> = Topic::new(
-    "guidance/wheel_torque",
-    Profile::State,
-    &[GUIDANCE],
-    &[SPACECRAFT],
-);
+pub const WHEEL_TORQUE: Topic<WheelTorque> =
+    Topic::new("guidance/wheel_torque", Profile::State, &[GUIDANCE], &[SPACECRAFT]);
 /// A task is wanted.
-pub const DECISION_POINT: Topic<DecisionPoint> = Topic::new(
-    "guidance/decision_point",
-    Profile::Command,
-    &[GUIDANCE],
-    &[REQUEST_MANAGER, PLANNER, LAUNCHER],
-);
+pub const DECISION_POINT: Topic<DecisionPoint> =
+    Topic::new("guidance/decision_point", Profile::Command, &[GUIDANCE], &[REQUEST_MANAGER, PLANNER, LAUNCHER]);
 /// What guidance is doing, every ten seconds.
 pub const GUIDANCE_STATUS: Topic<GuidanceStatus> =
     Topic::new("guidance/status", Profile::Event, &[GUIDANCE], &[LAUNCHER]);
 /// The next task.
-pub const PLANNER_TASK: Topic<ImagingTask> = Topic::new(
-    "planner/task",
-    Profile::Command,
-    &[PLANNER],
-    &[GUIDANCE, REQUEST_MANAGER],
-);
+pub const PLANNER_TASK: Topic<ImagingTask> =
+    Topic::new("planner/task", Profile::Command, &[PLANNER], &[GUIDANCE, REQUEST_MANAGER]);
 /// How the task was chosen.
-pub const PLANNER_DECISION: Topic<Decision> =
-    Topic::new("planner/decision", Profile::Event, &[PLANNER], &[LAUNCHER]);
+pub const PLANNER_DECISION: Topic<Decision> = Topic::new("planner/decision", Profile::Event, &[PLANNER], &[LAUNCHER]);
 /// The strips to choose among.
-pub const UPCOMING_STRIPS: Topic<UpcomingStrips> = Topic::new(
-    "requests/upcoming",
-    Profile::Latched,
-    &[REQUEST_MANAGER],
-    &[PLANNER],
-);
+pub const UPCOMING_STRIPS: Topic<UpcomingStrips> =
+    Topic::new("requests/upcoming", Profile::Latched, &[REQUEST_MANAGER], &[PLANNER]);
 /// A strip request from anyone, without an answer.
-pub const STRIP_REQUEST: Topic<StripRequest> = Topic::new(
-    "requests/request",
-    Profile::Event,
-    &[OPERATOR],
-    &[REQUEST_MANAGER],
-);
+pub const STRIP_REQUEST: Topic<StripRequest> =
+    Topic::new("requests/request", Profile::Event, &[OPERATOR], &[REQUEST_MANAGER]);
 /// Changes of strip requests.
-pub const STRIP_EVENTS: Topic<StripStatus> = Topic::new(
-    "requests/events",
-    Profile::Event,
-    &[REQUEST_MANAGER],
-    &[OPERATOR],
-);
+pub const STRIP_EVENTS: Topic<StripStatus> =
+    Topic::new("requests/events", Profile::Event, &[REQUEST_MANAGER], &[OPERATOR]);
 /// How many strip requests are in which state.
-pub const REQUEST_SUMMARY: Topic<RequestSummary> = Topic::new(
-    "requests/summary",
-    Profile::Latched,
-    &[REQUEST_MANAGER],
-    &[LAUNCHER, OPERATOR],
-);
+pub const REQUEST_SUMMARY: Topic<RequestSummary> =
+    Topic::new("requests/summary", Profile::Latched, &[REQUEST_MANAGER], &[LAUNCHER, OPERATOR]);
 /// Point on the ground below the satellite, decimated.
-pub const SUB_SATELLITE_POINT: Topic<NavSatFix> = Topic::new(
-    "spacecraft/sub_satellite_point",
-    Profile::Event,
-    &[SPACECRAFT],
-    &[],
-);
+pub const SUB_SATELLITE_POINT: Topic<NavSatFix> =
+    Topic::new("spacecraft/sub_satellite_point", Profile::Event, &[SPACECRAFT], &[]);
 /// Speeds and torques of the wheels, decimated.
-pub const WHEELS: Topic<JointState> =
-    Topic::new("spacecraft/wheels", Profile::Event, &[SPACECRAFT], &[]);
+pub const WHEELS: Topic<JointState> = Topic::new("spacecraft/wheels", Profile::Event, &[SPACECRAFT], &[]);
 /// Frames, decimated.
 pub const TF: Topic<TFMessage> = Topic::new("/tf", Profile::Event, &[SPACECRAFT], &[]);
 /// Health of the nodes.
-pub const DIAGNOSTICS: Topic<DiagnosticArray> =
-    Topic::new("/diagnostics", Profile::Event, &FLIGHT_NODES, &[LAUNCHER]);
+pub const DIAGNOSTICS: Topic<DiagnosticArray> = Topic::new("/diagnostics", Profile::Event, &FLIGHT_NODES, &[LAUNCHER]);
 /// Log lines of the nodes.
 pub const ROSOUT: Topic<Log> = Topic::new("/rosout", Profile::Log, &FLIGHT_NODES, &[]);
 /// Changes of parameters.
-pub const PARAMETER_EVENTS: Topic<ParameterEvent> =
-    Topic::new("/parameter_events", Profile::Event, &FLIGHT_NODES, &[]);
+pub const PARAMETER_EVENTS: Topic<ParameterEvent> = Topic::new("/parameter_events", Profile::Event, &FLIGHT_NODES, &[]);
 
 /// Submits strip requests, with an answer for each.
-pub const SUBMIT_STRIPS: Service<SubmitStrips> =
-    Service::new("requests/submit", &[REQUEST_MANAGER], &[OPERATOR]);
+pub const SUBMIT_STRIPS: Service<SubmitStrips> = Service::new("requests/submit", &[REQUEST_MANAGER], &[OPERATOR]);
 
 /// Every topic of the table; the recorder records these.
 pub const TOPICS: &[Entry] = &[
@@ -241,11 +178,7 @@ pub fn mermaid() -> String {
                 continue;
             }
             for (writer, reader) in pairs(entry) {
-                let (from, to) = if arrow == "-->" {
-                    (writer, reader)
-                } else {
-                    (reader, writer)
-                };
+                let (from, to) = if arrow == "-->" { (writer, reader) } else { (reader, writer) };
                 let _ = writeln!(chart, "    {from} {arrow}|{}| {to}", entry.name);
             }
         }
@@ -256,23 +189,15 @@ pub fn mermaid() -> String {
 
 fn pairs(entry: &Entry) -> impl Iterator<Item = (&'static str, &'static str)> {
     let (writers, readers) = (entry.writers, entry.readers);
-    writers
-        .iter()
-        .flat_map(move |writer| readers.iter().map(move |reader| (*writer, *reader)))
+    writers.iter().flat_map(move |writer| readers.iter().map(move |reader| (*writer, *reader)))
 }
 
 /// The table in Markdown.
 pub fn table() -> String {
-    let mut table =
-        "| topic | type | profile | written by | read by |\n| --- | --- | --- | --- | --- |\n"
-            .to_owned();
+    let mut table = "| topic | type | profile | written by | read by |\n| --- | --- | --- | --- | --- |\n".to_owned();
     for entry in TOPICS.iter().chain(SERVICES) {
         let list = |nodes: &[&str]| {
-            if nodes.is_empty() {
-                "any".to_owned()
-            } else {
-                nodes.join(", ")
-            }
+            if nodes.is_empty() { "any".to_owned() } else { nodes.join(", ") }
         };
         let _ = writeln!(
             table,
@@ -293,21 +218,13 @@ mod tests {
 
     #[test]
     fn each_topic_is_in_the_table_once_and_has_a_schema() {
-        let mut names: Vec<_> = TOPICS
-            .iter()
-            .chain(SERVICES)
-            .map(|entry| entry.name)
-            .collect();
+        let mut names: Vec<_> = TOPICS.iter().chain(SERVICES).map(|entry| entry.name).collect();
         names.sort_unstable();
         let count = names.len();
         names.dedup();
         assert_eq!(names.len(), count);
         for entry in TOPICS {
-            assert!(
-                swath_msgs::schema_for(entry.type_name).is_some(),
-                "{}",
-                entry.name
-            );
+            assert!(swath_msgs::schema_for(entry.type_name).is_some(), "{}", entry.name);
             assert!(!entry.writers.is_empty(), "{}", entry.name);
         }
     }

@@ -17,25 +17,13 @@ use crate::topic::Publisher;
 /// Sends the log lines of this process to stderr and, if there is a publisher, to `/rosout`.
 ///
 /// `name` is the name of the logger. It has no effect when the process logs already.
-pub(crate) fn install(
-    name: String,
-    level: Level,
-    clock: SimClock,
-    rosout: Option<Arc<Publisher<Log>>>,
-) {
+pub(crate) fn install(name: String, level: Level, clock: SimClock, rosout: Option<Arc<Publisher<Log>>>) {
     let stderr = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_timer(SimulatedTime(clock.clone()))
         .with_target(false);
-    let rosout = rosout.map(|publisher| Rosout {
-        name,
-        clock,
-        publisher,
-    });
-    let subscriber = tracing_subscriber::registry()
-        .with(LevelFilter::from_level(level))
-        .with(stderr)
-        .with(rosout);
+    let rosout = rosout.map(|publisher| Rosout { name, clock, publisher });
+    let subscriber = tracing_subscriber::registry().with(LevelFilter::from_level(level)).with(stderr).with(rosout);
     // Not `try_init`, which would take in the lines of RustDDS: they are many, and sending one on
     // `/rosout` from inside of RustDDS would lock it up.
     if tracing::subscriber::set_global_default(subscriber).is_err() {

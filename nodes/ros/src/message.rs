@@ -22,22 +22,13 @@ pub fn decode<M: RosMessage>(cdr: &Cdr) -> Result<M, RosError> {
 pub(crate) fn encode_as<T: Serialize>(type_name: &'static str, value: &T) -> Result<Cdr, RosError> {
     // The payload is aligned from its own start, so it is written by itself after the header.
     let mut bytes = header_with_room(2 * size_of::<T>());
-    to_writer::<T, LittleEndian, _>(&mut bytes, value).map_err(|error| RosError::Encode {
-        type_name,
-        reason: error.to_string(),
-    })?;
+    to_writer::<T, LittleEndian, _>(&mut bytes, value)
+        .map_err(|error| RosError::Encode { type_name, reason: error.to_string() })?;
     Ok(Cdr::from_bytes(bytes))
 }
 
-pub(crate) fn decode_as<T: DeserializeOwned>(
-    type_name: &'static str,
-    cdr: &Cdr,
-) -> Result<T, RosError> {
-    let failed = |reason: String| RosError::Decode {
-        type_name,
-        length: cdr.as_bytes().len(),
-        reason,
-    };
+pub(crate) fn decode_as<T: DeserializeOwned>(type_name: &'static str, cdr: &Cdr) -> Result<T, RosError> {
+    let failed = |reason: String| RosError::Decode { type_name, length: cdr.as_bytes().len(), reason };
     let read = if let Some(payload) = cdr.little_endian() {
         from_bytes::<T, LittleEndian>(payload)
     } else if let Some(payload) = cdr.big_endian() {
@@ -45,8 +36,7 @@ pub(crate) fn decode_as<T: DeserializeOwned>(
     } else {
         return Err(failed("it is not encoded as plain CDR".to_owned()));
     };
-    read.map(|(value, _)| value)
-        .map_err(|error| failed(error.to_string()))
+    read.map(|(value, _)| value).map_err(|error| failed(error.to_string()))
 }
 
 #[cfg(test)]
@@ -57,28 +47,17 @@ mod tests {
 
     #[test]
     fn both_byte_orders_are_read() {
-        let header = Header {
-            frame_id: "N".to_owned(),
-            ..Default::default()
-        };
+        let header = Header { frame_id: "N".to_owned(), ..Default::default() };
         let cdr = encode(&header).unwrap();
         assert_eq!(cdr.as_bytes()[..4], [0, 1, 0, 0]);
         assert_eq!(decode::<Header>(&cdr).unwrap(), header);
         let big = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, b'N', 0];
-        assert_eq!(
-            decode::<Header>(&Cdr::from_bytes(big.to_vec())).unwrap(),
-            header
-        );
+        assert_eq!(decode::<Header>(&Cdr::from_bytes(big.to_vec())).unwrap(), header);
     }
 
     #[test]
     fn what_is_no_message_is_refused() {
-        for bytes in [
-            vec![],
-            vec![0, 1],
-            vec![0, 1, 0, 0, 1],
-            vec![0, 7, 0, 0, 0, 0, 0, 0],
-        ] {
+        for bytes in [vec![], vec![0, 1], vec![0, 1, 0, 0, 1], vec![0, 7, 0, 0, 0, 0, 0, 0]] {
             assert!(decode::<Header>(&Cdr::from_bytes(bytes)).is_err());
         }
     }

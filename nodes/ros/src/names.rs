@@ -19,11 +19,7 @@ impl Names {
             check(&absolute)?;
         }
         check_token(name, name)?;
-        let mut names = Self {
-            namespace: absolute,
-            name: name.to_owned(),
-            remaps: Vec::new(),
-        };
+        let mut names = Self { namespace: absolute, name: name.to_owned(), remaps: Vec::new() };
         for (from, to) in remaps {
             let pair = (names.expand(from)?, names.expand(to)?);
             names.remaps.push(pair);
@@ -76,32 +72,22 @@ pub(crate) fn dds_topic(fully_qualified: &str) -> String {
 
 /// DDS names of a service's request and response topics.
 pub(crate) fn dds_service(fully_qualified: &str) -> (String, String) {
-    (
-        format!("rq{fully_qualified}Request"),
-        format!("rr{fully_qualified}Reply"),
-    )
+    (format!("rq{fully_qualified}Request"), format!("rr{fully_qualified}Reply"))
 }
 
 /// DDS name of a type, such as `std_msgs::msg::dds_::Header_`.
 pub(crate) fn dds_type(type_name: &str) -> Result<String, RosError> {
     let parts: Vec<&str> = type_name.split('/').collect();
     match parts[..] {
-        [package, kind @ ("msg" | "srv" | "action"), name]
-            if !package.is_empty() && !name.is_empty() =>
-        {
+        [package, kind @ ("msg" | "srv" | "action"), name] if !package.is_empty() && !name.is_empty() => {
             Ok(format!("{package}::{kind}::dds_::{name}_"))
         }
-        _ => Err(RosError::Name {
-            name: type_name.to_owned(),
-            reason: "a type is written package/msg/Name",
-        }),
+        _ => Err(RosError::Name { name: type_name.to_owned(), reason: "a type is written package/msg/Name" }),
     }
 }
 
 fn check(absolute: &str) -> Result<(), RosError> {
-    absolute[1..]
-        .split('/')
-        .try_for_each(|token| check_token(absolute, token))
+    absolute[1..].split('/').try_for_each(|token| check_token(absolute, token))
 }
 
 fn check_token(name: &str, token: &str) -> Result<(), RosError> {
@@ -116,10 +102,7 @@ fn check_token(name: &str, token: &str) -> Result<(), RosError> {
     } else {
         return Ok(());
     };
-    Err(RosError::Name {
-        name: name.to_owned(),
-        reason,
-    })
+    Err(RosError::Name { name: name.to_owned(), reason })
 }
 
 #[cfg(test)]
@@ -127,25 +110,16 @@ mod tests {
     use super::*;
 
     fn names(remaps: &[(&str, &str)]) -> Names {
-        let remaps: Vec<_> = remaps
-            .iter()
-            .map(|(a, b)| ((*a).to_owned(), (*b).to_owned()))
-            .collect();
+        let remaps: Vec<_> = remaps.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
         Names::new("/swath", "spacecraft", &remaps).unwrap()
     }
 
     #[test]
     fn relative_absolute_and_private_names_are_expanded() {
         let names = names(&[]);
-        assert_eq!(
-            names.resolve("spacecraft/state").unwrap(),
-            "/swath/spacecraft/state"
-        );
+        assert_eq!(names.resolve("spacecraft/state").unwrap(), "/swath/spacecraft/state");
         assert_eq!(names.resolve("/clock").unwrap(), "/clock");
-        assert_eq!(
-            names.resolve("~/get_parameters").unwrap(),
-            "/swath/spacecraft/get_parameters"
-        );
+        assert_eq!(names.resolve("~/get_parameters").unwrap(), "/swath/spacecraft/get_parameters");
         assert_eq!(names.fully_qualified(), "/swath/spacecraft");
         let root = Names::new("/", "spacecraft", &[]).unwrap();
         assert_eq!(root.resolve("state").unwrap(), "/state");
@@ -154,12 +128,7 @@ mod tests {
 
     #[test]
     fn remapping_compares_expanded_names() {
-        let names = names(&[
-            ("/swath/a", "b"),
-            ("c", "/d"),
-            ("~/e", "~/f"),
-            ("c", "/never"),
-        ]);
+        let names = names(&[("/swath/a", "b"), ("c", "/d"), ("~/e", "~/f"), ("c", "/never")]);
         assert_eq!(names.resolve("a").unwrap(), "/swath/b");
         assert_eq!(names.resolve("/swath/c").unwrap(), "/d");
         assert_eq!(names.resolve("~/e").unwrap(), "/swath/spacecraft/f");
@@ -174,10 +143,7 @@ mod tests {
             ("a/", "a part between slashes is empty"),
             ("", "a part between slashes is empty"),
             ("a/2b", "a part starts with a digit"),
-            (
-                "a-b",
-                "only letters, digits, underscores and slashes are allowed",
-            ),
+            ("a-b", "only letters, digits, underscores and slashes are allowed"),
             ("a__b", "there are two underscores in a row"),
         ] {
             let error = names.resolve(name).unwrap_err().to_string();
@@ -189,10 +155,7 @@ mod tests {
 
     #[test]
     fn types_have_their_dds_form() {
-        assert_eq!(
-            dds_type("std_msgs/msg/Header").unwrap(),
-            "std_msgs::msg::dds_::Header_"
-        );
+        assert_eq!(dds_type("std_msgs/msg/Header").unwrap(), "std_msgs::msg::dds_::Header_");
         assert!(dds_type("std_msgs/Header").is_err());
     }
 }

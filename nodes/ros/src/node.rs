@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Publisher as DdsPublisher, QosPolicies,
-    RTPSEntity as _, Subscriber as DdsSubscriber, TopicKind,
+    DomainParticipant, DomainParticipantBuilder, Publisher as DdsPublisher, QosPolicies, RTPSEntity as _,
+    Subscriber as DdsSubscriber, TopicKind,
 };
 use swath_msgs::{RosMessage, RosService};
 
@@ -70,11 +70,7 @@ impl Node {
     }
 
     /// As [`Self::start`], in an environment of the caller's choice.
-    pub fn start_in(
-        environment: Environment,
-        name: &str,
-        args: &RosArgs,
-    ) -> Result<Self, RosError> {
+    pub fn start_in(environment: Environment, name: &str, args: &RosArgs) -> Result<Self, RosError> {
         let names = args.names(graph::NAMESPACE, name)?;
         let dds = Dds::new(&environment)?;
         let signal = Signal::new();
@@ -89,12 +85,7 @@ impl Node {
             Arc::clone(&roster),
             &signal,
         );
-        let background = Background::start(
-            &dds.participant,
-            Arc::clone(&roster),
-            announcements,
-            signal.clone(),
-        )?;
+        let background = Background::start(&dds.participant, Arc::clone(&roster), announcements, signal.clone())?;
         let node = Self {
             background,
             endpoints: Mutex::default(),
@@ -111,9 +102,7 @@ impl Node {
     }
 
     fn come_up(&self, args: &RosArgs) -> Result<(), RosError> {
-        if self.roster.wait_until(Instant::now() + LISTENING, || {
-            self.roster.namesake().is_some()
-        }) {
+        if self.roster.wait_until(Instant::now() + LISTENING, || self.roster.namesake().is_some()) {
             return Err(self.duplicate());
         }
         self.roster.announce();
@@ -121,22 +110,10 @@ impl Node {
             true => Some(Arc::new(self.publisher(&graph::ROSOUT)?)),
             false => None,
         };
-        let logger = self
-            .names
-            .fully_qualified()
-            .trim_start_matches('/')
-            .replace('/', ".");
-        logging::install(
-            logger,
-            args.log_level_of(&self.names),
-            self.clock.clone(),
-            rosout,
-        );
-        let use_sim_time = Spec::new(
-            "use_sim_time",
-            true,
-            "Stamps and timers follow simulated time; there is no other here.",
-        );
+        let logger = self.names.fully_qualified().trim_start_matches('/').replace('/', ".");
+        logging::install(logger, args.log_level_of(&self.names), self.clock.clone(), rosout);
+        let use_sim_time =
+            Spec::new("use_sim_time", true, "Stamps and timers follow simulated time; there is no other here.");
         self.parameters.declare(use_sim_time.read_only())?;
         self.background.serve(self.parameter_services()?);
         Ok(())
@@ -152,36 +129,21 @@ impl Node {
             get_types: self.server(&graph::Service::new("~/get_parameter_types", &[], &[]))?,
             list: self.server(&graph::Service::new("~/list_parameters", &[], &[]))?,
             set: self.server(&graph::Service::new("~/set_parameters", &[], &[]))?,
-            set_atomically: self.server(&graph::Service::new(
-                "~/set_parameters_atomically",
-                &[],
-                &[],
-            ))?,
+            set_atomically: self.server(&graph::Service::new("~/set_parameters_atomically", &[], &[]))?,
             events: self.publisher(&graph::PARAMETER_EVENTS)?,
         })
     }
 
     /// A writer of a topic.
-    pub fn publisher<M: RosMessage>(
-        &self,
-        topic: &graph::Topic<M>,
-    ) -> Result<Publisher<M>, RosError> {
-        let Entry {
-            name,
-            type_name,
-            profile,
-            ..
-        } = topic.entry;
+    pub fn publisher<M: RosMessage>(&self, topic: &graph::Topic<M>) -> Result<Publisher<M>, RosError> {
+        let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_publisher(name, type_name, &profile.qos())?;
         self.remember(Direction::Write, raw.gid(), topic.entry);
         Ok(Publisher::new(raw))
     }
 
     /// A reader of a topic, with the depth of the topic's profile.
-    pub fn subscription<M: RosMessage>(
-        &self,
-        topic: &graph::Topic<M>,
-    ) -> Result<Subscription<M>, RosError> {
+    pub fn subscription<M: RosMessage>(&self, topic: &graph::Topic<M>) -> Result<Subscription<M>, RosError> {
         self.subscription_with_depth(topic, topic.entry.profile.depth())
     }
 
@@ -191,12 +153,7 @@ impl Node {
         topic: &graph::Topic<M>,
         depth: usize,
     ) -> Result<Subscription<M>, RosError> {
-        let Entry {
-            name,
-            type_name,
-            profile,
-            ..
-        } = topic.entry;
+        let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
         self.remember(Direction::Read, raw.gid(), topic.entry);
         Ok(Subscription::new(raw))
@@ -204,43 +161,20 @@ impl Node {
 
     /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
-    pub fn raw_publisher(
-        &self,
-        name: &str,
-        type_name: &str,
-        qos: &QosProfile,
-    ) -> Result<RawPublisher, RosError> {
+    pub fn raw_publisher(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawPublisher, RosError> {
         let topic = self.names.resolve(name)?;
-        self.writer(
-            topic.clone(),
-            &dds_topic(&topic),
-            &dds_type(type_name)?,
-            qos,
-        )
+        self.writer(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
     }
 
     /// A reader of CDR bytes from the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
-    pub fn raw_subscription(
-        &self,
-        name: &str,
-        type_name: &str,
-        qos: &QosProfile,
-    ) -> Result<RawSubscription, RosError> {
+    pub fn raw_subscription(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawSubscription, RosError> {
         let topic = self.names.resolve(name)?;
-        self.reader(
-            topic.clone(),
-            &dds_topic(&topic),
-            &dds_type(type_name)?,
-            qos,
-        )
+        self.reader(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
     }
 
     /// A server of a service.
-    pub fn server<S: RosService>(
-        &self,
-        service: &graph::Service<S>,
-    ) -> Result<Server<S>, RosError> {
+    pub fn server<S: RosService>(&self, service: &graph::Service<S>) -> Result<Server<S>, RosError> {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
         let qos = Profile::Service.qos();
@@ -252,10 +186,7 @@ impl Node {
     }
 
     /// A client of a service.
-    pub fn client<S: RosService>(
-        &self,
-        service: &graph::Service<S>,
-    ) -> Result<Client<S>, RosError> {
+    pub fn client<S: RosService>(&self, service: &graph::Service<S>) -> Result<Client<S>, RosError> {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
         let qos = Profile::Service.qos();
@@ -263,12 +194,7 @@ impl Node {
         let response_type = dds_type(S::Response::TYPE_NAME)?;
         let requests = self.writer(name.clone(), &request_topic, &request_type, &qos)?;
         let responses = self.reader(name.clone(), &response_topic, &response_type, &qos)?;
-        Ok(Client::new(
-            name,
-            requests,
-            responses,
-            self.environment.mapping,
-        ))
+        Ok(Client::new(name, requests, responses, self.environment.mapping))
     }
 
     fn writer(
@@ -280,11 +206,7 @@ impl Node {
     ) -> Result<RawPublisher, RosError> {
         let writer = self.dds.writer(dds_topic, dds_type, qos)?;
         self.roster.enrol(Direction::Write, writer.guid().into());
-        Ok(RawPublisher {
-            writer,
-            topic,
-            roster: Arc::clone(&self.roster),
-        })
+        Ok(RawPublisher { writer, topic, roster: Arc::clone(&self.roster) })
     }
 
     fn reader(
@@ -296,12 +218,7 @@ impl Node {
     ) -> Result<RawSubscription, RosError> {
         let reader = self.dds.reader(dds_topic, dds_type, qos)?;
         self.roster.enrol(Direction::Read, reader.guid().into());
-        Ok(RawSubscription::new(
-            reader,
-            topic,
-            Arc::clone(&self.roster),
-            &self.signal,
-        ))
+        Ok(RawSubscription::new(reader, topic, Arc::clone(&self.roster), &self.signal))
     }
 
     fn remember(&self, direction: Direction, gid: Gid, entry: Entry) {
@@ -316,48 +233,29 @@ impl Node {
     /// If this node has to go because another one has its name.
     pub fn wait(&self, timeout: Duration) -> Result<bool, RosError> {
         let news = self.signal.wait(timeout);
-        if self.background.must_yield() {
-            Err(self.duplicate())
-        } else {
-            Ok(news)
-        }
+        if self.background.must_yield() { Err(self.duplicate()) } else { Ok(news) }
     }
 
     /// Waits until each of the nodes (as the table names them, in this namespace) is matched on
-    /// every topic that it and this node have in common by the table, in the right direction.
+    /// every topic that it and this node have in common by the table, in the right direction. The
+    /// recorder has every topic in common with everyone.
     ///
     /// # Errors
     /// If that is not so when the time is over; the error names what is missing.
     pub fn wait_for_peers(&self, nodes: &[&str], timeout: Duration) -> Result<(), RosError> {
         let deadline = Instant::now() + timeout;
-        if !self
-            .roster
-            .wait_until(deadline, || self.missing(nodes).is_empty())
-        {
-            return Err(RosError::MissingPeers {
-                waited: timeout,
-                missing: self.missing(nodes),
-            });
+        if !self.roster.wait_until(deadline, || self.missing(nodes).is_empty()) {
+            return Err(RosError::MissingPeers { waited: timeout, missing: self.missing(nodes) });
         }
         std::thread::sleep(SETTLING);
         Ok(())
     }
 
     /// Waits until a server of the client's service is there.
-    pub fn wait_for_service<S: RosService>(
-        &self,
-        client: &Client<S>,
-        timeout: Duration,
-    ) -> Result<(), RosError> {
-        if !self
-            .roster
-            .wait_until(Instant::now() + timeout, || client.matched())
-        {
+    pub fn wait_for_service<S: RosService>(&self, client: &Client<S>, timeout: Duration) -> Result<(), RosError> {
+        if !self.roster.wait_until(Instant::now() + timeout, || client.matched()) {
             let missing = vec![format!("nobody serves {}", client.service())];
-            return Err(RosError::MissingPeers {
-                waited: timeout,
-                missing,
-            });
+            return Err(RosError::MissingPeers { waited: timeout, missing });
         }
         std::thread::sleep(SETTLING);
         Ok(())
@@ -378,12 +276,16 @@ impl Node {
                     Direction::Write => (entry.readers, "read"),
                     Direction::Read => (entry.writers, "write"),
                 };
-                if others.contains(node) && !self.roster.matched_nodes(*gid).contains(&full) {
+                let common = others.contains(node) || (*node == graph::RECORDER && *direction == Direction::Write);
+                let common = common && self.roster.is_enrolled(*direction, *gid);
+                if common && !self.roster.matched_nodes(*gid).contains(&full) {
                     missing.push(format!("{full} does not {verb} {}", entry.name));
                 }
             }
         }
-        missing.extend(self.roster.refusals());
+        if !missing.is_empty() {
+            missing.extend(self.roster.refusals());
+        }
         missing
     }
 
@@ -418,10 +320,7 @@ impl Node {
     }
 
     fn duplicate(&self) -> RosError {
-        RosError::DuplicateNode {
-            node: self.names.fully_qualified(),
-            domain: self.environment.domain,
-        }
+        RosError::DuplicateNode { node: self.names.fully_qualified(), domain: self.environment.domain }
     }
 }
 
@@ -443,11 +342,7 @@ impl Dds {
         let none = QosPolicies::builder().build();
         let publisher = participant.create_publisher(&none).map_err(failed)?;
         let subscriber = participant.create_subscriber(&none).map_err(failed)?;
-        Ok(Self {
-            publisher,
-            subscriber,
-            participant,
-        })
+        Ok(Self { publisher, subscriber, participant })
     }
 
     fn writer(
@@ -459,9 +354,7 @@ impl Dds {
         let what = format!("a writer of {topic}");
         let policies = policies(qos);
         let topic = self.topic(topic, type_name, &policies)?;
-        self.publisher
-            .create_datawriter_no_key(&topic, Some(policies))
-            .map_err(|error| create_error(&what, &error))
+        self.publisher.create_datawriter_no_key(&topic, Some(policies)).map_err(|error| create_error(&what, &error))
     }
 
     fn reader(
@@ -478,26 +371,13 @@ impl Dds {
             .map_err(|error| create_error(&what, &error))
     }
 
-    fn topic(
-        &self,
-        name: &str,
-        type_name: &str,
-        policies: &QosPolicies,
-    ) -> Result<rustdds::Topic, RosError> {
+    fn topic(&self, name: &str, type_name: &str, policies: &QosPolicies) -> Result<rustdds::Topic, RosError> {
         self.participant
-            .create_topic(
-                name.to_owned(),
-                type_name.to_owned(),
-                policies,
-                TopicKind::NoKey,
-            )
+            .create_topic(name.to_owned(), type_name.to_owned(), policies, TopicKind::NoKey)
             .map_err(|error| create_error(&format!("the topic {name}"), &error))
     }
 }
 
 fn create_error(what: &str, error: &rustdds::dds::CreateError) -> RosError {
-    RosError::Create {
-        what: what.to_owned(),
-        reason: error.to_string(),
-    }
+    RosError::Create { what: what.to_owned(), reason: error.to_string() }
 }

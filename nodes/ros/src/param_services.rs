@@ -1,11 +1,10 @@
 //! The six parameter services of a node, and its news on `/parameter_events`.
 
 use swath_msgs::rcl_interfaces::{
-    DescribeParameters, DescribeParametersResponse, GetParameterTypes, GetParameterTypesResponse,
-    GetParameters, GetParametersResponse, ListParameters, ListParametersRequest,
-    ListParametersResponse, ListParametersResult, Parameter, ParameterDescriptor, ParameterEvent,
-    ParameterType, ParameterValue, SetParameters, SetParametersAtomically,
-    SetParametersAtomicallyResponse, SetParametersResponse, SetParametersResult,
+    DescribeParameters, DescribeParametersResponse, GetParameterTypes, GetParameterTypesResponse, GetParameters,
+    GetParametersResponse, ListParameters, ListParametersRequest, ListParametersResponse, ListParametersResult,
+    Parameter, ParameterDescriptor, ParameterEvent, ParameterType, ParameterValue, SetParameters,
+    SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersResponse, SetParametersResult,
 };
 
 use crate::clock::SimClock;
@@ -43,43 +42,21 @@ impl ParameterServices {
     /// Answers what has been asked, and tells of what has changed.
     pub(crate) fn serve(&self) -> Result<(), RosError> {
         let parameters = &self.parameters;
-        self.describe
-            .answer_all(|request| DescribeParametersResponse {
-                descriptors: request
-                    .names
-                    .iter()
-                    .map(|name| describe(parameters, name))
-                    .collect(),
-            })?;
+        self.describe.answer_all(|request| DescribeParametersResponse {
+            descriptors: request.names.iter().map(|name| describe(parameters, name)).collect(),
+        })?;
         self.get.answer_all(|request| GetParametersResponse {
-            values: request
-                .names
-                .iter()
-                .map(|name| value(parameters, name))
-                .collect(),
+            values: request.names.iter().map(|name| value(parameters, name)).collect(),
         })?;
-        self.get_types
-            .answer_all(|request| GetParameterTypesResponse {
-                types: request
-                    .names
-                    .iter()
-                    .map(|name| value(parameters, name).r#type)
-                    .collect(),
-            })?;
-        self.list.answer_all(|request| ListParametersResponse {
-            result: list(&parameters.names(), &request),
+        self.get_types.answer_all(|request| GetParameterTypesResponse {
+            types: request.names.iter().map(|name| value(parameters, name).r#type).collect(),
         })?;
+        self.list.answer_all(|request| ListParametersResponse { result: list(&parameters.names(), &request) })?;
         self.set.answer_all(|request| SetParametersResponse {
-            results: request
-                .parameters
-                .into_iter()
-                .map(|parameter| set(parameters, vec![parameter]))
-                .collect(),
+            results: request.parameters.into_iter().map(|parameter| set(parameters, vec![parameter])).collect(),
         })?;
         self.set_atomically
-            .answer_all(|request| SetParametersAtomicallyResponse {
-                result: set(parameters, request.parameters),
-            })?;
+            .answer_all(|request| SetParametersAtomicallyResponse { result: set(parameters, request.parameters) })?;
         self.tell_changes()
     }
 
@@ -98,20 +75,15 @@ impl ParameterServices {
 }
 
 fn describe(parameters: &Parameters, name: &str) -> ParameterDescriptor {
-    parameters
-        .describe(name)
-        .unwrap_or_else(|| ParameterDescriptor {
-            name: name.to_owned(),
-            r#type: ParameterType::PARAMETER_NOT_SET,
-            ..Default::default()
-        })
+    parameters.describe(name).unwrap_or_else(|| ParameterDescriptor {
+        name: name.to_owned(),
+        r#type: ParameterType::PARAMETER_NOT_SET,
+        ..Default::default()
+    })
 }
 
 fn value(parameters: &Parameters, name: &str) -> ParameterValue {
-    parameters
-        .value(name)
-        .map(|value| value.to_msg())
-        .unwrap_or_default()
+    parameters.value(name).map(|value| value.to_msg()).unwrap_or_default()
 }
 
 fn set(parameters: &Parameters, wanted: Vec<Parameter>) -> SetParametersResult {
@@ -119,21 +91,12 @@ fn set(parameters: &Parameters, wanted: Vec<Parameter>) -> SetParametersResult {
         .into_iter()
         .map(|parameter| match Value::from_msg(&parameter.value) {
             Ok(value) => Ok((parameter.name, value)),
-            Err(reason) => Err(RosError::Parameter {
-                name: parameter.name,
-                reason,
-            }),
+            Err(reason) => Err(RosError::Parameter { name: parameter.name, reason }),
         })
         .collect();
     match values.and_then(|values| parameters.set_all(values)) {
-        Ok(()) => SetParametersResult {
-            successful: true,
-            reason: String::new(),
-        },
-        Err(error) => SetParametersResult {
-            successful: false,
-            reason: error.to_string(),
-        },
+        Ok(()) => SetParametersResult { successful: true, reason: String::new() },
+        Err(error) => SetParametersResult { successful: false, reason: error.to_string() },
     }
 }
 
@@ -154,10 +117,7 @@ fn list(names: &[String], request: &ListParametersRequest) -> ListParametersResu
         })
     };
     let names: Vec<String> = names.iter().filter(wanted).cloned().collect();
-    let mut prefixes: Vec<String> = names
-        .iter()
-        .filter_map(|name| Some(name.rsplit_once('.')?.0.to_owned()))
-        .collect();
+    let mut prefixes: Vec<String> = names.iter().filter_map(|name| Some(name.rsplit_once('.')?.0.to_owned())).collect();
     prefixes.dedup();
     ListParametersResult { names, prefixes }
 }
@@ -176,10 +136,7 @@ mod tests {
         assert_eq!(ask(&[], 0).names, names);
         assert_eq!(ask(&[], 0).prefixes, ["wheels", "wheels.rate"]);
         assert_eq!(ask(&[], 1).names, ["pace", "wheelspeed"]);
-        assert_eq!(
-            ask(&["wheels"], 0).names,
-            ["wheels.limit", "wheels.rate.max"]
-        );
+        assert_eq!(ask(&["wheels"], 0).names, ["wheels.limit", "wheels.rate.max"]);
         assert_eq!(ask(&["wheels"], 1).names, ["wheels.limit"]);
         assert_eq!(ask(&["pace"], 1).names, ["pace"]);
         assert!(ask(&["none"], 0).names.is_empty());

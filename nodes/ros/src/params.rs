@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex};
 
-use swath_msgs::rcl_interfaces::{
-    FloatingPointRange, IntegerRange, Parameter, ParameterDescriptor,
-};
+use swath_msgs::rcl_interfaces::{FloatingPointRange, IntegerRange, Parameter, ParameterDescriptor};
 
 use crate::cli::RosArgs;
 use crate::error::RosError;
@@ -27,13 +25,7 @@ pub struct Spec<T> {
 impl<T: Typed> Spec<T> {
     /// A parameter that may be changed while the node runs.
     pub const fn new(name: &'static str, default: T, description: &'static str) -> Self {
-        Self {
-            name,
-            default,
-            description,
-            range: None,
-            read_only: false,
-        }
+        Self { name, default, description, range: None, read_only: false }
     }
 
     /// The parameter cannot be changed once the node runs.
@@ -78,16 +70,10 @@ impl Parameters {
     pub(crate) fn new(args: &RosArgs, names: &Names) -> Self {
         let store = Store {
             given: args.overrides(names),
-            addressed: args
-                .addressed(names)
-                .into_iter()
-                .map(str::to_owned)
-                .collect(),
+            addressed: args.addressed(names).into_iter().map(str::to_owned).collect(),
             ..Store::default()
         };
-        Self {
-            shared: Arc::new(Mutex::new(store)),
-        }
+        Self { shared: Arc::new(Mutex::new(store)) }
     }
 
     /// Declares a parameter and returns its value: the one given at start, or else the default.
@@ -96,10 +82,7 @@ impl Parameters {
     /// If the value given is of another type or out of range, or the name is taken.
     pub fn declare<T: Typed>(&self, spec: Spec<T>) -> Result<T, RosError> {
         let mut store = lock(&self.shared);
-        let failed = |reason: String| RosError::Parameter {
-            name: spec.name.to_owned(),
-            reason,
-        };
+        let failed = |reason: String| RosError::Parameter { name: spec.name.to_owned(), reason };
         if store.declared.contains_key(spec.name) {
             return Err(failed("it is declared twice".to_owned()));
         }
@@ -112,8 +95,8 @@ impl Parameters {
         };
         let given = store.given.get(spec.name).cloned().unwrap_or(default);
         declared.value = declared.checked(given).map_err(failed)?;
-        let value = T::from_value(&declared.value)
-            .ok_or_else(|| failed("its type and its value disagree".to_owned()))?;
+        let value =
+            T::from_value(&declared.value).ok_or_else(|| failed("its type and its value disagree".to_owned()))?;
         store.declared.insert(spec.name.to_owned(), declared);
         Ok(value)
     }
@@ -124,11 +107,7 @@ impl Parameters {
     /// others and are not checked.
     pub fn check_given(&self) -> Result<(), RosError> {
         let store = lock(&self.shared);
-        match store
-            .addressed
-            .iter()
-            .find(|name| !store.declared.contains_key(*name))
-        {
+        match store.addressed.iter().find(|name| !store.declared.contains_key(*name)) {
             None => Ok(()),
             Some(name) => {
                 let known: Vec<&str> = store.declared.keys().map(String::as_str).collect();
@@ -142,10 +121,7 @@ impl Parameters {
 
     /// The value of a parameter, if it is declared with this type.
     pub fn get<T: Typed>(&self, name: &str) -> Option<T> {
-        lock(&self.shared)
-            .declared
-            .get(name)
-            .and_then(|declared| T::from_value(&declared.value))
+        lock(&self.shared).declared.get(name).and_then(|declared| T::from_value(&declared.value))
     }
 
     /// A number that grows with every change.
@@ -163,19 +139,12 @@ impl Parameters {
         let mut store = lock(&self.shared);
         let mut checked = Vec::new();
         for (name, value) in values {
-            let value = store
-                .settable(&name, value)
-                .map_err(|reason| RosError::Parameter {
-                    name: name.clone(),
-                    reason,
-                })?;
+            let value =
+                store.settable(&name, value).map_err(|reason| RosError::Parameter { name: name.clone(), reason })?;
             checked.push((name, value));
         }
         for (name, value) in checked {
-            store.changes.push(Parameter {
-                name: name.clone(),
-                value: value.to_msg(),
-            });
+            store.changes.push(Parameter { name: name.clone(), value: value.to_msg() });
             store.revision += 1;
             if let Some(declared) = store.declared.get_mut(&name) {
                 declared.value = value;
@@ -196,27 +165,18 @@ impl Parameters {
 
     /// The value of a parameter, of whatever type.
     pub fn value(&self, name: &str) -> Option<Value> {
-        lock(&self.shared)
-            .declared
-            .get(name)
-            .map(|declared| declared.value.clone())
+        lock(&self.shared).declared.get(name).map(|declared| declared.value.clone())
     }
 
     /// What a parameter is, as ROS describes it.
     pub(crate) fn describe(&self, name: &str) -> Option<ParameterDescriptor> {
-        lock(&self.shared)
-            .declared
-            .get(name)
-            .map(|declared| declared.describe(name))
+        lock(&self.shared).declared.get(name).map(|declared| declared.describe(name))
     }
 }
 
 impl Store {
     fn settable(&self, name: &str, value: Value) -> Result<Value, String> {
-        let declared = self
-            .declared
-            .get(name)
-            .ok_or("there is no such parameter")?;
+        let declared = self.declared.get(name).ok_or("there is no such parameter")?;
         if declared.read_only {
             return Err("it cannot be changed while the node runs".to_owned());
         }
@@ -235,11 +195,9 @@ impl Declared {
         };
         match &self.range {
             // NaN is in no range.
-            Some(range) if !range.contains(&number) => Err(format!(
-                "{number} is outside {} to {}",
-                range.start(),
-                range.end()
-            )),
+            Some(range) if !range.contains(&number) => {
+                Err(format!("{number} is outside {} to {}", range.start(), range.end()))
+            }
             None if number.is_nan() => Err("it is not a number".to_owned()),
             _ => Ok(value),
         }
@@ -257,17 +215,9 @@ impl Declared {
             let (from_value, to_value) = (*range.start(), *range.end());
             if matches!(self.value, Value::Integer(_)) {
                 let (from_value, to_value) = (from_value as i64, to_value as i64);
-                descriptor.integer_range = vec![IntegerRange {
-                    from_value,
-                    to_value,
-                    step: 0,
-                }];
+                descriptor.integer_range = vec![IntegerRange { from_value, to_value, step: 0 }];
             } else {
-                let range = FloatingPointRange {
-                    from_value,
-                    to_value,
-                    step: 0.0,
-                };
+                let range = FloatingPointRange { from_value, to_value, step: 0.0 };
                 descriptor.floating_point_range = vec![range];
             }
         }
@@ -322,26 +272,15 @@ mod tests {
     fn changes_are_checked_counted_and_told() {
         let parameters = parameters("");
         parameters.declare(pace()).unwrap();
-        parameters
-            .declare(Spec::new("seed", 1_i64, "Seed.").read_only())
-            .unwrap();
+        parameters.declare(Spec::new("seed", 1_i64, "Seed.").read_only()).unwrap();
         parameters.set("pace", Value::Double(3.0)).unwrap();
         assert_eq!(parameters.get::<f64>("pace"), Some(3.0));
         assert_eq!(parameters.revision(), 1);
         assert_eq!(parameters.take_changes()[0].value.double_value, 3.0);
         assert!(parameters.take_changes().is_empty());
-        let fixed = parameters
-            .set("seed", Value::Integer(2))
-            .unwrap_err()
-            .to_string();
-        assert_eq!(
-            fixed,
-            "parameter `seed`: it cannot be changed while the node runs"
-        );
-        let both = vec![
-            ("pace".to_owned(), Value::Double(4.0)),
-            ("none".to_owned(), Value::Bool(true)),
-        ];
+        let fixed = parameters.set("seed", Value::Integer(2)).unwrap_err().to_string();
+        assert_eq!(fixed, "parameter `seed`: it cannot be changed while the node runs");
+        let both = vec![("pace".to_owned(), Value::Double(4.0)), ("none".to_owned(), Value::Bool(true))];
         assert!(parameters.set_all(both).is_err());
         assert_eq!(parameters.get::<f64>("pace"), Some(3.0));
     }

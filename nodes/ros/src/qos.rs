@@ -64,9 +64,7 @@ impl Profile {
         QosProfile::publisher_default()
             .reliability_reliable(WhenFull::Wait(SEND_TIMEOUT))
             .durability(durability)
-            .history(History::KeepLast {
-                depth: self.depth(),
-            })
+            .history(History::KeepLast { depth: self.depth() })
             .lifespan(lifespan)
     }
 }
@@ -99,25 +97,14 @@ mod tests {
             Profile::Service,
         ] {
             let qos = profile.qos();
-            assert!(
-                matches!(qos.reliability, Reliability::Reliable { .. }),
-                "{profile:?}"
-            );
-            assert_eq!(
-                qos.history,
-                History::KeepLast {
-                    depth: profile.depth()
-                }
-            );
+            assert!(matches!(qos.reliability, Reliability::Reliable { .. }), "{profile:?}");
+            assert_eq!(qos.history, History::KeepLast { depth: profile.depth() });
         }
     }
 
     #[test]
     fn latched_topics_are_kept_for_late_readers() {
-        assert_eq!(
-            Profile::Latched.qos().durability,
-            Durability::TransientLocal
-        );
+        assert_eq!(Profile::Latched.qos().durability, Durability::TransientLocal);
         assert_eq!(Profile::State.qos().durability, Durability::Volatile);
     }
 }

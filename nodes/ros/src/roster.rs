@@ -44,13 +44,7 @@ struct State {
 
 impl Roster {
     pub(crate) fn new(own: Gid, names: Names, announcer: DataWriter<Cdr, Adapter>) -> Self {
-        Self {
-            own,
-            names,
-            announcer,
-            state: Mutex::default(),
-            changed: Condvar::new(),
-        }
+        Self { own, names, announcer, state: Mutex::default(), changed: Condvar::new() }
     }
 
     /// Lets the other processes know of this node, now and whenever its endpoints change.
@@ -77,6 +71,15 @@ impl Roster {
         self.change_own(direction, |gids| gids.remove(&gid));
     }
 
+    /// Whether this endpoint of ours still exists.
+    pub(crate) fn is_enrolled(&self, direction: Direction, gid: Gid) -> bool {
+        let state = lock(&self.state);
+        match direction {
+            Direction::Write => state.writers.contains(&gid),
+            Direction::Read => state.readers.contains(&gid),
+        }
+    }
+
     fn change_own(&self, direction: Direction, change: impl FnOnce(&mut BTreeSet<Gid>) -> bool) {
         let mut state = lock(&self.state);
         let gids = match direction {
@@ -99,10 +102,7 @@ impl Roster {
     }
 
     fn send(&self, node_entities_info_seq: Vec<NodeEntitiesInfo>) {
-        let message = ParticipantEntitiesInfo {
-            gid: gid_msg(&self.own),
-            node_entities_info_seq,
-        };
+        let message = ParticipantEntitiesInfo { gid: gid_msg(&self.own), node_entities_info_seq };
         let sent = encode(&message).map(|cdr| self.announcer.write(cdr, Some(Timestamp::now())));
         match sent {
             Ok(Ok(())) => {}
@@ -117,9 +117,7 @@ impl Roster {
             Ok(info) => {
                 let participant = Gid(info.gid.data);
                 if participant != self.own {
-                    lock(&self.state)
-                        .nodes
-                        .insert(participant, info.node_entities_info_seq);
+                    lock(&self.state).nodes.insert(participant, info.node_entities_info_seq);
                     self.changed.notify_all();
                 }
             }
@@ -132,16 +130,10 @@ impl Roster {
         use DomainParticipantStatusEvent as Event;
         let mut state = lock(&self.state);
         match event {
-            Event::RemoteReaderMatched {
-                local_writer,
-                remote_reader,
-            } => {
+            Event::RemoteReaderMatched { local_writer, remote_reader } => {
                 state.match_up(local_writer.into(), remote_reader.into());
             }
-            Event::RemoteWriterMatched {
-                local_reader,
-                remote_writer,
-            } => {
+            Event::RemoteWriterMatched { local_reader, remote_writer } => {
                 state.match_up(local_reader.into(), remote_writer.into());
             }
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
@@ -162,34 +154,19 @@ impl Roster {
 
     pub(crate) fn matched(&self, own: Gid) -> Vec<Gid> {
         let state = lock(&self.state);
-        state
-            .matched
-            .get(&own)
-            .into_iter()
-            .flatten()
-            .copied()
-            .collect()
+        state.matched.get(&own).into_iter().flatten().copied().collect()
     }
 
     /// Fully qualified names of the nodes that own the remote endpoints matched with ours.
     pub(crate) fn matched_nodes(&self, own: Gid) -> BTreeSet<String> {
         let state = lock(&self.state);
         let matched = state.matched.get(&own);
-        matched
-            .into_iter()
-            .flatten()
-            .filter_map(|gid| state.node_of(gid))
-            .collect()
+        matched.into_iter().flatten().filter_map(|gid| state.node_of(gid)).collect()
     }
 
     /// Fully qualified names of all nodes of the other processes.
     pub(crate) fn nodes(&self) -> BTreeSet<String> {
-        lock(&self.state)
-            .nodes
-            .values()
-            .flatten()
-            .map(fully_qualified)
-            .collect()
+        lock(&self.state).nodes.values().flatten().map(fully_qualified).collect()
     }
 
     /// The participant of another process that has a node of our name.
@@ -224,11 +201,7 @@ impl Roster {
             // What is waited for may also change without a notification: look every so often.
             let slice = remaining.min(Duration::from_millis(50));
             let guard = lock(&self.state);
-            drop(
-                self.changed
-                    .wait_timeout(guard, slice)
-                    .unwrap_or_else(PoisonError::into_inner),
-            );
+            drop(self.changed.wait_timeout(guard, slice).unwrap_or_else(PoisonError::into_inner));
         }
     }
 }
@@ -252,11 +225,8 @@ impl State {
     }
 
     fn refuse(&mut self, remote: Gid, what: &str) {
-        let of = self
-            .node_of(&remote)
-            .map_or(String::new(), |node| format!(" of {node}"));
-        self.refusals
-            .insert(format!("{what}{of} asks for another quality of service"));
+        let of = self.node_of(&remote).map_or(String::new(), |node| format!(" of {node}"));
+        self.refusals.insert(format!("{what}{of} asks for another quality of service"));
     }
 
     fn node_of(&self, endpoint: &Gid) -> Option<String> {
@@ -264,19 +234,13 @@ impl State {
         self.nodes
             .values()
             .flatten()
-            .find(|node| {
-                node.reader_gid_seq.contains(&endpoint) || node.writer_gid_seq.contains(&endpoint)
-            })
+            .find(|node| node.reader_gid_seq.contains(&endpoint) || node.writer_gid_seq.contains(&endpoint))
             .map(fully_qualified)
     }
 }
 
 fn fully_qualified(node: &NodeEntitiesInfo) -> String {
-    format!(
-        "{}/{}",
-        node.node_namespace.trim_end_matches('/'),
-        node.node_name
-    )
+    format!("{}/{}", node.node_namespace.trim_end_matches('/'), node.node_name)
 }
 
 fn gid_msg(gid: &Gid) -> rmw_dds_common::Gid {

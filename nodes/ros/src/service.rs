@@ -54,10 +54,7 @@ struct Framed<M> {
 
 impl RequestId {
     fn of(identity: SampleIdentity) -> Self {
-        Self {
-            client: identity.writer_guid.to_bytes(),
-            number: identity.sequence_number.into(),
-        }
+        Self { client: identity.writer_guid.to_bytes(), number: identity.sequence_number.into() }
     }
 
     fn identity(self) -> SampleIdentity {
@@ -76,11 +73,7 @@ impl Mapping {
     fn wrap<M: RosMessage>(self, id: RequestId, message: M) -> Result<Cdr, RosError> {
         match self {
             Self::Cyclone => {
-                let framed = Framed {
-                    client: id.second_half(),
-                    number: id.number,
-                    message,
-                };
+                let framed = Framed { client: id.second_half(), number: id.number, message };
                 encode_as(M::TYPE_NAME, &framed)
             }
             Self::Enhanced => encode(&message),
@@ -88,32 +81,19 @@ impl Mapping {
     }
 
     /// Takes a request or response apart. `client` is whose first half of the identity counts.
-    fn unwrap<M: RosMessage>(
-        self,
-        sample: &RawSample,
-        client: [u8; 16],
-    ) -> Result<(RequestId, M), RosError> {
+    fn unwrap<M: RosMessage>(self, sample: &RawSample, client: [u8; 16]) -> Result<(RequestId, M), RosError> {
         match self {
             Self::Cyclone => {
                 let framed: Framed<M> = decode_as(M::TYPE_NAME, &sample.cdr)?;
-                let mut id = RequestId {
-                    client,
-                    number: framed.number,
-                };
+                let mut id = RequestId { client, number: framed.number };
                 id.client[8..].copy_from_slice(&framed.client);
                 Ok((id, framed.message))
             }
             Self::Enhanced => {
-                let own = RequestId {
-                    client: sample.info.writer.0,
-                    number: sample.info.sequence_number,
-                };
+                let own = RequestId { client: sample.info.writer.0, number: sample.info.sequence_number };
                 let id = match sample.info.related.map(RequestId::of) {
                     Some(related) if related.number == i64::from(SequenceNumber::UNKNOWN) => {
-                        RequestId {
-                            number: own.number,
-                            ..related
-                        }
+                        RequestId { number: own.number, ..related }
                     }
                     Some(related) => related,
                     None => own,
@@ -133,17 +113,8 @@ pub struct Server<S> {
 }
 
 impl<S: RosService> Server<S> {
-    pub(crate) fn new(
-        requests: RawSubscription,
-        responses: RawPublisher,
-        mapping: Mapping,
-    ) -> Self {
-        Self {
-            requests,
-            responses,
-            mapping,
-            service: PhantomData,
-        }
+    pub(crate) fn new(requests: RawSubscription, responses: RawPublisher, mapping: Mapping) -> Self {
+        Self { requests, responses, mapping, service: PhantomData }
     }
 
     /// The next request, if there is one; it is answered with [`Self::respond`].
@@ -168,10 +139,7 @@ impl<S: RosService> Server<S> {
     /// Answers all requests that have come, and returns how many.
     ///
     /// A request that cannot be read is logged and passed over.
-    pub fn answer_all(
-        &self,
-        mut answer: impl FnMut(S::Request) -> S::Response,
-    ) -> Result<usize, RosError> {
+    pub fn answer_all(&self, mut answer: impl FnMut(S::Request) -> S::Response) -> Result<usize, RosError> {
         let mut answered = 0;
         loop {
             match self.take() {
@@ -212,24 +180,13 @@ impl<S: RosService> Client<S> {
         let signal = Signal::new();
         responses.set_signal(&signal);
         let next = AtomicI64::new(1);
-        Self {
-            requests,
-            responses,
-            mapping,
-            signal,
-            service,
-            next,
-            kind: PhantomData,
-        }
+        Self { requests, responses, mapping, signal, service, next, kind: PhantomData }
     }
 
     /// Sends a request, and returns the id that its response will have.
     pub fn send(&self, request: S::Request) -> Result<RequestId, RosError> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
-        let id = RequestId {
-            client: self.requests.gid().0,
-            number,
-        };
+        let id = RequestId { client: self.requests.gid().0, number };
         let cdr = self.mapping.wrap(id, request)?;
         let sent = match self.mapping {
             Mapping::Cyclone => self.requests.send(cdr, Some(id.identity()))?,
@@ -268,10 +225,7 @@ impl<S: RosService> Client<S> {
             }
             let remaining = deadline.saturating_duration_since(Instant::now());
             if remaining.is_zero() {
-                return Err(RosError::NoAnswer {
-                    service: self.service.clone(),
-                    waited: timeout,
-                });
+                return Err(RosError::NoAnswer { service: self.service.clone(), waited: timeout });
             }
             self.signal.wait(remaining);
         }
@@ -297,13 +251,7 @@ mod tests {
 
     fn sample(cdr: Cdr, related: Option<SampleIdentity>) -> RawSample {
         let writer = Gid(std::array::from_fn(|index| index as u8));
-        let info = SampleInfo {
-            source_time_ns: None,
-            received_time_ns: 0,
-            writer,
-            sequence_number: 5,
-            related,
-        };
+        let info = SampleInfo { source_time_ns: None, received_time_ns: 0, writer, sequence_number: 5, related };
         RawSample { cdr, info }
     }
 
@@ -324,51 +272,28 @@ mod tests {
     fn cyclone_frames_carry_client_and_number_before_the_message() {
         let client = std::array::from_fn(|index| index as u8);
         let id = RequestId { client, number: 7 };
-        let text = Text {
-            data: "a".to_owned(),
-        };
+        let text = Text { data: "a".to_owned() };
         let cdr = Mapping::Cyclone.wrap(id, text.clone()).unwrap();
-        let expected = [
-            &[0, 1, 0, 0][..],
-            &[8, 9, 10, 11, 12, 13, 14, 15],
-            &7_i64.to_le_bytes(),
-            &[2, 0, 0, 0, b'a', 0],
-        ]
-        .concat();
+        let expected =
+            [&[0, 1, 0, 0][..], &[8, 9, 10, 11, 12, 13, 14, 15], &7_i64.to_le_bytes(), &[2, 0, 0, 0, b'a', 0]].concat();
         assert_eq!(cdr.as_bytes(), expected);
-        let read = Mapping::Cyclone
-            .unwrap::<Text>(&sample(cdr, None), client)
-            .unwrap();
+        let read = Mapping::Cyclone.unwrap::<Text>(&sample(cdr, None), client).unwrap();
         assert_eq!(read, (id, text));
     }
 
     #[test]
     fn enhanced_requests_are_named_by_the_sample() {
-        let text = Text {
-            data: "a".to_owned(),
-        };
-        let id = RequestId {
-            client: [9; 16],
-            number: 7,
-        };
+        let text = Text { data: "a".to_owned() };
+        let id = RequestId { client: [9; 16], number: 7 };
         let cdr = Mapping::Enhanced.wrap(id, text.clone()).unwrap();
         assert_eq!(cdr, encode(&text).unwrap());
         let unwrap = |related| {
             let sample = sample(cdr.clone(), related);
-            Mapping::Enhanced
-                .unwrap::<Text>(&sample, [0; 16])
-                .unwrap()
-                .0
+            Mapping::Enhanced.unwrap::<Text>(&sample, [0; 16]).unwrap().0
         };
         assert_eq!(unwrap(Some(id.identity())), id);
         assert_eq!(unwrap(None).number, 5);
-        let unknown = RequestId {
-            number: SequenceNumber::UNKNOWN.into(),
-            ..id
-        };
-        assert_eq!(
-            unwrap(Some(unknown.identity())),
-            RequestId { number: 5, ..id }
-        );
+        let unknown = RequestId { number: SequenceNumber::UNKNOWN.into(), ..id };
+        assert_eq!(unwrap(Some(unknown.identity())), RequestId { number: 5, ..id });
     }
 }

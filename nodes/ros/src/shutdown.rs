@@ -19,10 +19,8 @@ impl Shutdown {
     /// Watches for Ctrl-C and SIGTERM, which raise `signal` too. A second one ends the process.
     pub fn on_signals(signal: &Signal) -> Result<Self, RosError> {
         let shutdown = Self::default();
-        let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(|source| RosError::System {
-            what: "signals cannot be watched",
-            source,
-        })?;
+        let mut signals = Signals::new([SIGINT, SIGTERM])
+            .map_err(|source| RosError::System { what: "signals cannot be watched", source })?;
         let (watcher, wake) = (shutdown.clone(), signal.clone());
         std::thread::Builder::new()
             .name("signals".to_owned())
@@ -35,10 +33,7 @@ impl Shutdown {
                     wake.raise();
                 }
             })
-            .map_err(|source| RosError::System {
-                what: "no thread for signals",
-                source,
-            })?;
+            .map_err(|source| RosError::System { what: "no thread for signals", source })?;
         Ok(shutdown)
     }
 

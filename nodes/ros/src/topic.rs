@@ -18,10 +18,7 @@ pub struct Publisher<M> {
 
 impl<M: RosMessage> Publisher<M> {
     pub(crate) fn new(raw: RawPublisher) -> Self {
-        Self {
-            raw,
-            message: PhantomData,
-        }
+        Self { raw, message: PhantomData }
     }
 
     /// Sends a message.
@@ -70,10 +67,7 @@ pub struct Subscription<M> {
 
 impl<M: RosMessage> Subscription<M> {
     pub(crate) fn new(raw: RawSubscription) -> Self {
-        Self {
-            raw,
-            message: PhantomData,
-        }
+        Self { raw, message: PhantomData }
     }
 
     /// The next message, if there is one.
@@ -91,10 +85,7 @@ impl<M: RosMessage> Subscription<M> {
         let Some(sample) = self.raw.take()? else {
             return Ok(None);
         };
-        Ok(Some(Sample {
-            message: decode(&sample.cdr)?,
-            info: sample.info,
-        }))
+        Ok(Some(Sample { message: decode(&sample.cdr)?, info: sample.info }))
     }
 
     /// Waits for the next message, and returns nothing when the time is over.

@@ -93,11 +93,7 @@ impl Value {
         if value.type_code() == like.type_code() {
             Ok(value)
         } else {
-            Err(format!(
-                "{} is needed, {} was given",
-                like.type_name(),
-                value.type_name()
-            ))
+            Err(format!("{} is needed, {} was given", like.type_name(), value.type_name()))
         }
     }
 
@@ -113,10 +109,7 @@ impl Value {
 
     /// The value as a message.
     pub(crate) fn to_msg(&self) -> ParameterValue {
-        let mut message = ParameterValue {
-            r#type: self.type_code(),
-            ..Default::default()
-        };
+        let mut message = ParameterValue { r#type: self.type_code(), ..Default::default() };
         match self.clone() {
             Self::Bool(value) => message.bool_value = value,
             Self::Integer(value) => message.integer_value = value,
@@ -140,15 +133,9 @@ impl Value {
             ParameterType::PARAMETER_STRING => Self::String(message.string_value.clone()),
             ParameterType::PARAMETER_BYTE_ARRAY => Self::Bytes(message.byte_array_value.clone()),
             ParameterType::PARAMETER_BOOL_ARRAY => Self::Bools(message.bool_array_value.clone()),
-            ParameterType::PARAMETER_INTEGER_ARRAY => {
-                Self::Integers(message.integer_array_value.clone())
-            }
-            ParameterType::PARAMETER_DOUBLE_ARRAY => {
-                Self::Doubles(message.double_array_value.clone())
-            }
-            ParameterType::PARAMETER_STRING_ARRAY => {
-                Self::Strings(message.string_array_value.clone())
-            }
+            ParameterType::PARAMETER_INTEGER_ARRAY => Self::Integers(message.integer_array_value.clone()),
+            ParameterType::PARAMETER_DOUBLE_ARRAY => Self::Doubles(message.double_array_value.clone()),
+            ParameterType::PARAMETER_STRING_ARRAY => Self::Strings(message.string_array_value.clone()),
             ParameterType::PARAMETER_NOT_SET => return Err("it cannot be unset".to_owned()),
             other => return Err(format!("{other} is not a parameter type")),
         })
@@ -156,30 +143,19 @@ impl Value {
 }
 
 fn list(items: &[Yaml]) -> Result<Value, String> {
-    let values: Vec<Value> = items
-        .iter()
-        .map(Value::from_yaml)
-        .collect::<Result<_, _>>()?;
+    let values: Vec<Value> = items.iter().map(Value::from_yaml).collect::<Result<_, _>>()?;
     let mixed = || "the items of the list are not all of one type".to_owned();
     let all_of = |pick: fn(&Value) -> bool| values.iter().all(pick);
     if values.is_empty() {
         Ok(Value::Strings(Vec::new()))
     } else if all_of(|value| matches!(value, Value::Bool(_))) {
-        collect(&values, bool::from_value)
-            .map(Value::Bools)
-            .ok_or_else(mixed)
+        collect(&values, bool::from_value).map(Value::Bools).ok_or_else(mixed)
     } else if all_of(|value| matches!(value, Value::Integer(_))) {
-        collect(&values, i64::from_value)
-            .map(Value::Integers)
-            .ok_or_else(mixed)
+        collect(&values, i64::from_value).map(Value::Integers).ok_or_else(mixed)
     } else if all_of(|value| matches!(value, Value::Integer(_) | Value::Double(_))) {
-        collect(&values, f64::from_value)
-            .map(Value::Doubles)
-            .ok_or_else(mixed)
+        collect(&values, f64::from_value).map(Value::Doubles).ok_or_else(mixed)
     } else {
-        collect(&values, String::from_value)
-            .map(Value::Strings)
-            .ok_or_else(mixed)
+        collect(&values, String::from_value).map(Value::Strings).ok_or_else(mixed)
     }
 }
 
@@ -253,22 +229,13 @@ mod tests {
             ("[1, 2]", Value::Integers(vec![1, 2])),
             ("[1, 2.5]", Value::Doubles(vec![1.0, 2.5])),
             ("[true, false]", Value::Bools(vec![true, false])),
-            (
-                "[a, b]",
-                Value::Strings(vec!["a".to_owned(), "b".to_owned()]),
-            ),
+            ("[a, b]", Value::Strings(vec!["a".to_owned(), "b".to_owned()])),
         ] {
             assert_eq!(Value::from_text(text).unwrap(), value, "{text}");
         }
         assert_eq!(Value::from_text("").unwrap_err(), "it has no value");
-        assert_eq!(
-            Value::from_text("{a: 1}").unwrap_err(),
-            "it is not a scalar or a list"
-        );
-        assert_eq!(
-            Value::from_text("[1, a]").unwrap_err(),
-            "the items of the list are not all of one type"
-        );
+        assert_eq!(Value::from_text("{a: 1}").unwrap_err(), "it is not a scalar or a list");
+        assert_eq!(Value::from_text("[1, a]").unwrap_err(), "the items of the list are not all of one type");
         assert!(Value::from_text("18446744073709551615").is_err());
         assert!(Value::from_text("[1").is_err());
     }
@@ -276,20 +243,9 @@ mod tests {
     #[test]
     fn whole_numbers_do_for_doubles_and_nothing_else_is_mixed() {
         let double = Value::Double(0.0);
-        assert_eq!(
-            Value::Integer(2).coerced(&double).unwrap(),
-            Value::Double(2.0)
-        );
-        assert_eq!(
-            Value::Double(2.0).coerced(&Value::Integer(0)).unwrap_err(),
-            "integer is needed, double was given"
-        );
-        assert_eq!(
-            Value::Strings(Vec::new())
-                .coerced(&Value::Doubles(vec![1.0]))
-                .unwrap(),
-            Value::Doubles(Vec::new())
-        );
+        assert_eq!(Value::Integer(2).coerced(&double).unwrap(), Value::Double(2.0));
+        assert_eq!(Value::Double(2.0).coerced(&Value::Integer(0)).unwrap_err(), "integer is needed, double was given");
+        assert_eq!(Value::Strings(Vec::new()).coerced(&Value::Doubles(vec![1.0])).unwrap(), Value::Doubles(Vec::new()));
     }
 
     #[test]
@@ -308,12 +264,6 @@ mod tests {
             assert_eq!(Value::from_msg(&value.to_msg()).unwrap(), value);
         }
         assert!(Value::from_msg(&ParameterValue::default()).is_err());
-        assert!(
-            Value::from_msg(&ParameterValue {
-                r#type: 77,
-                ..Default::default()
-            })
-            .is_err()
-        );
+        assert!(Value::from_msg(&ParameterValue { r#type: 77, ..Default::default() }).is_err());
     }
 }

@@ -4,32 +4,46 @@
 use std::time::{Duration, Instant};
 
 use swath_msgs::rcl_interfaces::{
-    GetParameters, GetParametersRequest, ListParameters, ListParametersRequest, Parameter,
-    ParameterType, ParameterValue, SetParameters, SetParametersRequest,
+    GetParameters, GetParametersRequest, ListParameters, ListParametersRequest, Parameter, ParameterType,
+    ParameterValue, SetParameters, SetParametersRequest,
 };
 use swath_msgs::swath_msgs::{
-    RequestSummary, SpacecraftState, StripRequest, SubmitResult, SubmitStripsRequest,
-    SubmitStripsResponse, WheelTorque,
+    RequestSummary, SpacecraftState, StripRequest, SubmitResult, SubmitStripsRequest, SubmitStripsResponse, WheelTorque,
 };
-use swath_ros::{
-    Environment, Mapping, Node, RosArgs, RosError, Spec, Value, decode, encode, graph,
-};
+use swath_ros::{Environment, Mapping, Node, RosArgs, RosError, Spec, Value, decode, encode, graph};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A node in the domain that the test has for itself, on this host only.
-fn start(domain: u16, name: &str, line: &str) -> Result<Node, RosError> {
-    start_mapped(domain, name, line, Mapping::Cyclone)
+/// A domain and a namespace that one test has for itself, even while the same tests run elsewhere on this host.
+struct Trial {
+    domain: u16,
+    namespace: String,
 }
 
-fn start_mapped(domain: u16, name: &str, line: &str, mapping: Mapping) -> Result<Node, RosError> {
-    let args = RosArgs::split(line.split_whitespace().map(str::to_owned))?.1;
-    let environment = Environment {
-        domain,
-        localhost_only: true,
-        mapping,
-    };
-    Node::start_in(environment, name, &args)
+impl Trial {
+    fn new(number: u16) -> Self {
+        let process = std::process::id();
+        // Domains 10 to 29: their ports lie below those that the system hands out.
+        let domain = 10 + (process as u16 % 20 + number) % 20;
+        Self { domain, namespace: format!("/p{process}") }
+    }
+
+    /// Starts a node on this host only, with words after `--ros-args`.
+    fn start(&self, name: &str, words: &str) -> Result<Node, RosError> {
+        self.start_mapped(name, words, Mapping::Cyclone)
+    }
+
+    fn start_mapped(&self, name: &str, words: &str, mapping: Mapping) -> Result<Node, RosError> {
+        let line = format!("--ros-args -r __ns:={} {words}", self.namespace);
+        let args = RosArgs::split(line.split_whitespace().map(str::to_owned))?.1;
+        let environment = Environment { domain: self.domain, localhost_only: true, mapping };
+        Node::start_in(environment, name, &args)
+    }
+
+    /// The name in this trial's namespace.
+    fn full(&self, name: &str) -> String {
+        format!("{}/{name}", self.namespace)
+    }
 }
 
 /// Tries until there is something or patience is over.
@@ -39,10 +53,7 @@ fn eventually<T>(mut attempt: impl FnMut() -> Option<T>) -> T {
         if let Some(found) = attempt() {
             return found;
         }
-        assert!(
-            Instant::now() < deadline,
-            "it did not happen in {PATIENCE:?}"
-        );
+        assert!(Instant::now() < deadline, "it did not happen in {PATIENCE:?}");
         std::thread::sleep(Duration::from_millis(1));
     }
 }
@@ -50,46 +61,30 @@ fn eventually<T>(mut attempt: impl FnMut() -> Option<T>) -> T {
 #[test]
 fn states_and_torques_go_both_ways_and_none_is_lost() {
     const TICKS: u64 = 2000;
-    let spacecraft = start(210, graph::SPACECRAFT, "").unwrap();
-    let guidance = start(210, graph::GUIDANCE, "").unwrap();
+    let trial = Trial::new(0);
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
     let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
     let torques = spacecraft.subscription(&graph::WHEEL_TORQUE).unwrap();
     let echo = std::thread::spawn(move || {
         let states = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
         let torques = guidance.publisher(&graph::WHEEL_TORQUE).unwrap();
-        guidance
-            .wait_for_peers(&[graph::SPACECRAFT], PATIENCE)
-            .unwrap();
+        guidance.wait_for_peers(&[graph::SPACECRAFT], PATIENCE).unwrap();
         let mut expected = 0;
         while expected < TICKS {
             let state = states.wait(guidance.signal(), PATIENCE).unwrap().unwrap();
             assert_eq!(state.tick, expected);
-            torques
-                .publish(&WheelTorque {
-                    tick: state.tick,
-                    ..Default::default()
-                })
-                .unwrap();
+            torques.publish(&WheelTorque { tick: state.tick, ..Default::default() }).unwrap();
             expected += 1;
         }
         assert!(torques.flush(PATIENCE));
         states.lost()
     });
-    spacecraft
-        .wait_for_peers(&[graph::GUIDANCE], PATIENCE)
-        .unwrap();
+    spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
     assert_eq!(states.matched(), 1);
     for tick in 0..TICKS {
-        states
-            .publish(&SpacecraftState {
-                tick,
-                ..Default::default()
-            })
-            .unwrap();
-        let torque = torques
-            .wait(spacecraft.signal(), PATIENCE)
-            .unwrap()
-            .unwrap();
+        states.publish(&SpacecraftState { tick, ..Default::default() }).unwrap();
+        let torque = torques.wait(spacecraft.signal(), PATIENCE).unwrap().unwrap();
         assert_eq!(torque.tick, tick);
     }
     assert_eq!(torques.lost(), 0);
@@ -98,47 +93,30 @@ fn states_and_torques_go_both_ways_and_none_is_lost() {
 
 #[test]
 fn a_late_reader_gets_what_is_latched() {
-    let manager = start(211, graph::REQUEST_MANAGER, "").unwrap();
+    let trial = Trial::new(1);
+    let manager = trial.start(graph::REQUEST_MANAGER, "").unwrap();
     let summaries = manager.publisher(&graph::REQUEST_SUMMARY).unwrap();
     for tick in 1..=3 {
-        summaries
-            .publish(&RequestSummary {
-                tick,
-                ..Default::default()
-            })
-            .unwrap();
+        summaries.publish(&RequestSummary { tick, ..Default::default() }).unwrap();
     }
-    let late = start(211, graph::OPERATOR, "").unwrap();
+    let late = trial.start(graph::OPERATOR, "").unwrap();
     let received = late.subscription(&graph::REQUEST_SUMMARY).unwrap();
     let summary = eventually(|| received.take().unwrap().filter(|summary| summary.tick == 3));
-    assert_eq!(
-        summary,
-        RequestSummary {
-            tick: 3,
-            ..Default::default()
-        }
-    );
+    assert_eq!(summary, RequestSummary { tick: 3, ..Default::default() });
 }
 
 #[test]
 fn raw_endpoints_pass_the_bytes_of_typed_ones() {
-    let player = start(212, graph::PLAYER, "").unwrap();
-    let recorder = start(212, graph::RECORDER, "").unwrap();
+    let trial = Trial::new(2);
+    let player = trial.start(graph::PLAYER, "").unwrap();
+    let recorder = trial.start(graph::RECORDER, "").unwrap();
     let entry = graph::SPACECRAFT_STATE.entry;
     let qos = entry.profile.qos();
-    let writer = player
-        .raw_publisher(entry.name, entry.type_name, &qos)
-        .unwrap();
-    let reader = recorder
-        .raw_subscription(entry.name, entry.type_name, &qos)
-        .unwrap();
+    let writer = player.raw_publisher(entry.name, entry.type_name, &qos).unwrap();
+    let reader = recorder.raw_subscription(entry.name, entry.type_name, &qos).unwrap();
     eventually(|| (writer.matched() > 0 && reader.matched() > 0).then_some(()));
     std::thread::sleep(Duration::from_millis(300));
-    let state = SpacecraftState {
-        tick: 7,
-        wheel_speed: [1.0, 2.0, 3.0],
-        ..Default::default()
-    };
+    let state = SpacecraftState { tick: 7, wheel_speed: [1.0, 2.0, 3.0], ..Default::default() };
     let cdr = encode(&state).unwrap();
     writer.publish(cdr.clone()).unwrap();
     let sample = eventually(|| reader.take().unwrap());
@@ -148,7 +126,7 @@ fn raw_endpoints_pass_the_bytes_of_typed_ones() {
     assert_eq!(sample.info.sequence_number, 1);
     let sent = sample.info.source_time_ns.unwrap();
     assert!(sent <= sample.info.received_time_ns);
-    assert_eq!(reader.topic(), "/swath/spacecraft/state");
+    assert_eq!(reader.topic(), trial.full("spacecraft/state"));
     let big_endian = swath_ros::Cdr::from_bytes(vec![0, 0, 0, 0, 1]);
     assert!(writer.publish(big_endian).is_err());
 }
@@ -160,13 +138,11 @@ fn judge(request: SubmitStripsRequest) -> SubmitStripsResponse {
         reason: strip.name.clone(),
         ..Default::default()
     };
-    SubmitStripsResponse {
-        results: request.requests.iter().map(judge_one).collect(),
-    }
+    SubmitStripsResponse { results: request.requests.iter().map(judge_one).collect() }
 }
 
-fn services_answer(domain: u16, mapping: Mapping) {
-    let manager = start_mapped(domain, graph::REQUEST_MANAGER, "", mapping).unwrap();
+fn services_answer(trial: &Trial, mapping: Mapping) {
+    let manager = trial.start_mapped(graph::REQUEST_MANAGER, "", mapping).unwrap();
     let serving = std::thread::spawn(move || {
         let server = manager.server(&graph::SUBMIT_STRIPS).unwrap();
         let mut answered = server.answer_all(judge).unwrap();
@@ -175,18 +151,12 @@ fn services_answer(domain: u16, mapping: Mapping) {
             answered += server.answer_all(judge).unwrap();
         }
     });
-    let operator = start_mapped(domain, graph::OPERATOR, "", mapping).unwrap();
+    let operator = trial.start_mapped(graph::OPERATOR, "", mapping).unwrap();
     let client = operator.client(&graph::SUBMIT_STRIPS).unwrap();
     operator.wait_for_service(&client, PATIENCE).unwrap();
     for priority in [0.1, 0.9] {
-        let strip = StripRequest {
-            name: "delta".to_owned(),
-            priority,
-            ..Default::default()
-        };
-        let request = SubmitStripsRequest {
-            requests: vec![strip],
-        };
+        let strip = StripRequest { name: "delta".to_owned(), priority, ..Default::default() };
+        let request = SubmitStripsRequest { requests: vec![strip] };
         let response = client.call(request, PATIENCE).unwrap();
         assert_eq!(response.results.len(), 1);
         assert_eq!(response.results[0].accepted, priority > 0.5);
@@ -197,132 +167,87 @@ fn services_answer(domain: u16, mapping: Mapping) {
 
 #[test]
 fn services_answer_with_the_mapping_of_cyclone() {
-    services_answer(213, Mapping::Cyclone);
+    services_answer(&Trial::new(3), Mapping::Cyclone);
 }
 
 #[test]
 fn services_answer_with_the_enhanced_mapping() {
-    services_answer(214, Mapping::Enhanced);
+    services_answer(&Trial::new(4), Mapping::Enhanced);
 }
 
 #[test]
 fn a_service_that_nobody_serves_is_named() {
-    let operator = start(215, graph::OPERATOR, "").unwrap();
+    let trial = Trial::new(5);
+    let operator = trial.start(graph::OPERATOR, "").unwrap();
     let client = operator.client(&graph::SUBMIT_STRIPS).unwrap();
     let brief = Duration::from_millis(50);
-    let error = operator
-        .wait_for_service(&client, brief)
-        .unwrap_err()
-        .to_string();
-    assert_eq!(
-        error,
-        "still missing after 0.05 s: nobody serves /swath/requests/submit"
-    );
-    let error = client
-        .call(SubmitStripsRequest::default(), brief)
-        .unwrap_err()
-        .to_string();
-    assert_eq!(
-        error,
-        "service /swath/requests/submit did not answer within 0.05 s"
-    );
+    let error = operator.wait_for_service(&client, brief).unwrap_err().to_string();
+    let service = trial.full("requests/submit");
+    assert_eq!(error, format!("still missing after 0.05 s: nobody serves {service}"));
+    let error = client.call(SubmitStripsRequest::default(), brief).unwrap_err().to_string();
+    assert_eq!(error, format!("service {service} did not answer within 0.05 s"));
 }
 
 #[test]
 fn parameters_are_read_and_set_from_outside() {
-    let line = "--ros-args -p pace:=2.0 -r __ns:=/other";
-    let node = start(216, graph::SPACECRAFT, line).unwrap();
+    let trial = Trial::new(6);
+    let node = trial.start(graph::SPACECRAFT, "-p pace:=2.0").unwrap();
     let pace = Spec::new("pace", 0.0, "Speed against real time.").in_range(0.0..=100.0);
     assert_eq!(node.parameters().declare(pace).unwrap(), 2.0);
     node.parameters().check_given().unwrap();
 
-    let tool = start(216, graph::OPERATOR, "").unwrap();
-    let list = tool
-        .client::<ListParameters>(&graph::Service::new(
-            "/other/spacecraft/list_parameters",
-            &[],
-            &[],
-        ))
-        .unwrap();
+    let tool = trial.start(graph::OPERATOR, "").unwrap();
+    let list = tool.client::<ListParameters>(&graph::Service::new("spacecraft/list_parameters", &[], &[])).unwrap();
     tool.wait_for_service(&list, PATIENCE).unwrap();
-    let names = list
-        .call(ListParametersRequest::default(), PATIENCE)
-        .unwrap()
-        .result
-        .names;
+    let names = list.call(ListParametersRequest::default(), PATIENCE).unwrap().result.names;
     assert_eq!(names, ["pace", "use_sim_time"]);
 
-    let set = tool
-        .client::<SetParameters>(&graph::Service::new(
-            "/other/spacecraft/set_parameters",
-            &[],
-            &[],
-        ))
-        .unwrap();
-    let get = tool
-        .client::<GetParameters>(&graph::Service::new(
-            "/other/spacecraft/get_parameters",
-            &[],
-            &[],
-        ))
-        .unwrap();
+    let set = tool.client::<SetParameters>(&graph::Service::new("spacecraft/set_parameters", &[], &[])).unwrap();
+    let get = tool.client::<GetParameters>(&graph::Service::new("spacecraft/get_parameters", &[], &[])).unwrap();
     let events = tool.subscription(&graph::PARAMETER_EVENTS).unwrap();
     eventually(|| (events.matched() > 0).then_some(()));
     tool.wait_for_service(&set, PATIENCE).unwrap();
     tool.wait_for_service(&get, PATIENCE).unwrap();
     let wanted = |double_value| Parameter {
         name: "pace".to_owned(),
-        value: ParameterValue {
-            r#type: ParameterType::PARAMETER_DOUBLE,
-            double_value,
-            ..Default::default()
-        },
+        value: ParameterValue { r#type: ParameterType::PARAMETER_DOUBLE, double_value, ..Default::default() },
     };
-    let request = SetParametersRequest {
-        parameters: vec![wanted(3.0), wanted(101.0)],
-    };
+    let request = SetParametersRequest { parameters: vec![wanted(3.0), wanted(101.0)] };
     let results = set.call(request, PATIENCE).unwrap().results;
     assert!(results[0].successful);
-    assert_eq!(
-        results[1].reason,
-        "parameter `pace`: 101 is outside 0 to 100"
-    );
-    let request = GetParametersRequest {
-        names: vec!["pace".to_owned(), "none".to_owned()],
-    };
+    assert_eq!(results[1].reason, "parameter `pace`: 101 is outside 0 to 100");
+    let request = GetParametersRequest { names: vec!["pace".to_owned(), "none".to_owned()] };
     let values = get.call(request, PATIENCE).unwrap().values;
     assert_eq!(values[0], wanted(3.0).value);
     assert_eq!(values[1].r#type, ParameterType::PARAMETER_NOT_SET);
     assert_eq!(node.parameters().value("pace"), Some(Value::Double(3.0)));
     let event = eventually(|| events.take().unwrap());
-    assert_eq!(event.node, "/other/spacecraft");
+    assert_eq!(event.node, trial.full("spacecraft"));
     assert_eq!(event.changed_parameters, [wanted(3.0)]);
 }
 
 #[test]
 fn a_second_node_of_the_same_name_is_refused() {
-    let first = start(217, graph::SPACECRAFT, "").unwrap();
-    let error = start(217, graph::SPACECRAFT, "")
-        .map(|_| ())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.starts_with("a node named /swath/spacecraft is already running in domain 217"),
-        "{error}"
-    );
+    let trial = Trial::new(7);
+    let first = trial.start(graph::SPACECRAFT, "").unwrap();
+    let error = trial.start(graph::SPACECRAFT, "").map(|_| ()).unwrap_err().to_string();
+    let name = trial.full("spacecraft");
+    let expected = format!("a node named {name} is already running in domain {}", trial.domain);
+    assert!(error.starts_with(&expected), "{error}");
     first.wait(Duration::ZERO).unwrap();
-    let elsewhere = start(217, graph::SPACECRAFT, "--ros-args -r __ns:=/two").unwrap();
-    assert!(elsewhere.nodes().contains("/swath/spacecraft"));
+    let other_namespace = format!("-r __ns:={}/two", trial.namespace);
+    let elsewhere = trial.start(graph::SPACECRAFT, &other_namespace).unwrap();
+    assert!(elsewhere.nodes().contains(&name));
     drop(first);
-    eventually(|| (!elsewhere.nodes().contains("/swath/spacecraft")).then_some(()));
-    start(217, graph::SPACECRAFT, "").unwrap();
+    eventually(|| (!elsewhere.nodes().contains(&name)).then_some(()));
+    trial.start(graph::SPACECRAFT, "").unwrap();
 }
 
 #[test]
 fn of_two_nodes_that_start_together_one_remains() {
     let spawn = || {
         std::thread::spawn(|| {
-            let node = start(218, graph::PLANNER, "")?;
+            let node = Trial::new(8).start(graph::PLANNER, "")?;
             let deadline = Instant::now() + Duration::from_secs(3);
             while Instant::now() < deadline {
                 node.wait(Duration::from_millis(100))?;
@@ -337,23 +262,60 @@ fn of_two_nodes_that_start_together_one_remains() {
 
 #[test]
 fn what_is_missing_is_named() {
-    let guidance = start(219, graph::GUIDANCE, "").unwrap();
+    let trial = Trial::new(9);
+    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
     let _torques = guidance.publisher(&graph::WHEEL_TORQUE).unwrap();
     let _states = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
     let wait = |timeout| guidance.wait_for_peers(&[graph::SPACECRAFT], timeout);
+    let name = trial.full("spacecraft");
     let error = wait(Duration::from_millis(100)).unwrap_err().to_string();
-    assert_eq!(
-        error,
-        "still missing after 0.1 s: node /swath/spacecraft is not there"
-    );
-    let spacecraft = start(219, graph::SPACECRAFT, "").unwrap();
+    assert_eq!(error, format!("still missing after 0.1 s: node {name} is not there"));
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
     let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
     eventually(|| (states.matched() > 0).then_some(()));
     let error = wait(Duration::from_secs(1)).unwrap_err().to_string();
-    assert_eq!(
-        error,
-        "still missing after 1 s: /swath/spacecraft does not read guidance/wheel_torque"
-    );
+    assert_eq!(error, format!("still missing after 1 s: {name} does not read guidance/wheel_torque"));
     let _torques = spacecraft.subscription(&graph::WHEEL_TORQUE).unwrap();
     wait(PATIENCE).unwrap();
+}
+
+#[test]
+fn the_recorder_is_there_when_it_reads_everything() {
+    let trial = Trial::new(10);
+    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
+    let recorder = trial.start(graph::RECORDER, "").unwrap();
+    let mut readers = Vec::new();
+    for entry in graph::TOPICS.iter().filter(|entry| entry.name != "/parameter_events") {
+        readers.push(recorder.raw_subscription(entry.name, entry.type_name, &entry.profile.qos()).unwrap());
+    }
+    eventually(|| guidance.nodes().contains(&trial.full("recorder")).then_some(()));
+    let wait = |timeout| guidance.wait_for_peers(&[graph::RECORDER], timeout);
+    let error = wait(Duration::from_secs(1)).unwrap_err().to_string();
+    assert_eq!(error, format!("still missing after 1 s: {} does not read /parameter_events", trial.full("recorder")));
+    let entry = graph::PARAMETER_EVENTS.entry;
+    readers.push(recorder.raw_subscription(entry.name, entry.type_name, &entry.profile.qos()).unwrap());
+    wait(PATIENCE).unwrap();
+}
+
+/// A reader keeps only so much: what is pushed out before it is taken must not go unnoticed.
+#[test]
+fn what_is_not_taken_in_time_is_counted_as_lost() {
+    const SENT: u64 = 1000;
+    let trial = Trial::new(11);
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
+    let publisher = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
+    let states = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
+    spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
+    let send = |tick| publisher.publish(&SpacecraftState { tick, ..Default::default() }).unwrap();
+    send(0);
+    assert_eq!(eventually(|| states.take().unwrap()).tick, 0);
+    (1..SENT).for_each(send);
+    assert!(publisher.flush(PATIENCE));
+    let mut taken = 1;
+    while states.take().unwrap().is_some() {
+        taken += 1;
+    }
+    assert!(states.lost() > 0, "a reader that keeps 64 samples kept {taken}");
+    assert_eq!(taken + states.lost(), SENT);
 }

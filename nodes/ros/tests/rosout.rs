@@ -6,12 +6,10 @@ use swath_ros::{Environment, Mapping, Node, RosArgs, graph};
 
 #[test]
 fn log_lines_reach_rosout() {
-    let environment = Environment {
-        domain: 220,
-        localhost_only: true,
-        mapping: Mapping::Cyclone,
-    };
-    let args = RosArgs::default();
+    let process = std::process::id();
+    let environment = Environment { domain: 10 + process as u16 % 20, localhost_only: true, mapping: Mapping::Cyclone };
+    let words = format!("--ros-args -r __ns:=/p{process}");
+    let args = RosArgs::split(words.split_whitespace().map(str::to_owned)).unwrap().1;
     let node = Node::start_in(environment.clone(), graph::PLANNER, &args).unwrap();
     let listener = Node::start_in(environment, graph::LAUNCHER, &args).unwrap();
     let lines = listener.subscription(&graph::ROSOUT).unwrap();
@@ -28,7 +26,7 @@ fn log_lines_reach_rosout() {
     };
     assert_eq!(line.msg, "too much limit=3");
     assert_eq!(line.level, swath_msgs::rcl_interfaces::Log::WARN);
-    assert_eq!(line.name, "swath.planner");
+    assert_eq!(line.name, format!("p{process}.planner"));
     assert_eq!((line.stamp.sec, line.stamp.nanosec), (1, 500_000_000));
     assert!(line.file.ends_with("rosout.rs"), "{}", line.file);
 }
