@@ -68,7 +68,7 @@ pub struct Mission {
     pub pace: f64,
     /// Simulated time of the mission's epoch [s since 1970-01-01 UTC].
     pub epoch_unix_s: u32,
-    /// Planner: `heuristic:SECONDS` or `random`.
+    /// Planner: `lookahead`, `lookahead:TICKS` of margin, `heuristic:SECONDS` or `random`.
     pub planner: PlannerSpec,
     /// Strips known from the start.
     pub requests: MissionRequests,

@@ -83,6 +83,29 @@ impl Flight {
         }
     }
 
+    /// A flight in a planner's head: from what is known of the satellite, by what the model says of it.
+    #[must_use]
+    pub fn predicted(model: &Model, situation: &Situation) -> Self {
+        let spacecraft = Spacecraft {
+            orbit: Orbit::through(&situation.r_BN_N, &situation.v_BN_N, situation.now, model.period),
+            body: situation.body,
+            now: situation.now,
+            torque_applied: Vector3::zeros(),
+            plant: model.plant.clone(),
+        };
+        let mut flight = Self { spacecraft, guidance: Guidance::new(model), torque_pending: situation.torque_pending };
+        flight.guidance.servo_integral = situation.servo_integral;
+        flight
+    }
+
+    /// Goes back to a situation on the same orbit.
+    pub fn rewind(&mut self, situation: &Situation) {
+        self.spacecraft.body = situation.body;
+        self.spacecraft.now = situation.now;
+        self.guidance.servo_integral = situation.servo_integral;
+        self.torque_pending = situation.torque_pending;
+    }
+
     /// Simulated time.
     #[must_use]
     pub fn now(&self) -> Tick {

@@ -100,6 +100,17 @@ impl Orbit {
         }
     }
 
+    /// The circular orbit through a position [m] and a velocity [m/s] in N at a tick.
+    #[must_use]
+    pub fn through(r_BN_N: &Vector3<f64>, v_BN_N: &Vector3<f64>, now: Tick, period: TickPeriod) -> Self {
+        let radius = r_BN_N.norm();
+        let node_N = r_BN_N / radius;
+        let ahead_N = (v_BN_N - node_N * v_BN_N.dot(&node_N)).normalize();
+        let mean_motion = v_BN_N.norm() / radius;
+        let phase = -mean_motion * period.time_s(now);
+        Self { radius, mean_motion, node_N, ahead_N, argument: Turn::new(phase, mean_motion, period) }
+    }
+
     /// Position r_BN_N [m] at a tick.
     #[inline]
     pub fn position(&mut self, tick: Tick) -> Vector3<f64> {
@@ -182,6 +193,19 @@ mod tests {
         // Vis viva on a circle: v² = μ/r.
         assert_relative_eq!(v.norm_squared(), 3.986_004_418e14 / r.norm(), max_relative = 1e-12);
         assert_relative_eq!(r.cross(&v).normalize().z, libm::cos(45f64.to_radians()), epsilon = 1e-12);
+    }
+
+    #[test]
+    fn the_orbit_through_a_state_is_the_orbit_that_it_came_from() {
+        let period = TickPeriod::from_frequency(2.0).unwrap();
+        let phase = OrbitPhase { raan_deg: 30.0, argument_of_latitude_deg: 40.0 };
+        let mut orbit = Orbit::new(&SimConfig::default(), phase, period);
+        let now = Tick(100_000);
+        let mut again = Orbit::through(&orbit.position(now), &orbit.velocity(now), now, period);
+        for tick in [now, Tick(100_700)] {
+            assert_relative_eq!(again.position(tick), orbit.position(tick), epsilon = 1e-5);
+            assert_relative_eq!(again.velocity(tick), orbit.velocity(tick), epsilon = 1e-8);
+        }
     }
 
     #[test]

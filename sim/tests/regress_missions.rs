@@ -7,7 +7,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
 use swath_sim::model::Model;
 use swath_sim::observation::ObservationSet;
-use swath_sim::planner::{Decision, Heuristic, Planner, Random};
+use swath_sim::planner::{Decision, Heuristic, Lookahead, Planner, Random};
 
 fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<TaskRecord> {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());
@@ -28,6 +28,21 @@ fn the_heuristic_never_fails_for_elevation() {
     assert!(totals.attempts > 500, "{totals:?}");
     assert_eq!(totals.failed_elevation, 0);
     assert!((0.6..0.95).contains(&totals.success_rate()), "{totals:?}");
+}
+
+#[test]
+fn the_lookahead_planner_never_fails_and_wastes_no_time() {
+    let (mut lookahead, mut heuristic) = (Totals::default(), Totals::default());
+    for seed in 0..6 {
+        for record in fly(&mut Lookahead::default(), seed) {
+            lookahead.add(&record);
+        }
+        for record in fly(&mut Heuristic { t_pre_s: 90.0 }, seed) {
+            heuristic.add(&record);
+        }
+    }
+    assert_eq!((lookahead.failed_attitude, lookahead.failed_elevation), (0, 0));
+    assert!(lookahead.reward > 1.4 * heuristic.reward, "{lookahead:?} {heuristic:?}");
 }
 
 #[test]

@@ -40,7 +40,7 @@ struct PlannerNode {
 
 impl PlannerNode {
     fn new(base: MissionNode) -> Result<Self> {
-        let name = Spec::new("planner", base.mission.planner.to_string(), "`heuristic:SECONDS` or `random`.");
+        let name = Spec::new("planner", base.mission.planner.to_string(), "As the mission file names planners.");
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
         base.node.parameters().check_given()?;
         Ok(Self {

@@ -1,9 +1,11 @@
 //! Planners: which strip next, and how long a transition before it.
 
 mod heuristic;
+mod lookahead;
 mod random;
 
 pub use heuristic::Heuristic;
+pub use lookahead::Lookahead;
 pub use random::Random;
 
 use thiserror::Error;
