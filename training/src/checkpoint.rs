@@ -55,11 +55,14 @@ pub fn save(trainer: &Trainer, path: &Path) -> Result<()> {
     let seeds: Vec<u64> = slots.iter().map(|slot| slot.seed).collect();
     let lengths: Vec<u64> = slots.iter().map(|slot| slot.actions.len() as u64).collect();
     let actions = || slots.iter().flat_map(|slot| &slot.actions);
+    // No episode is cut off after 0 decisions: 0 stands for none.
+    let limits: Vec<u64> = slots.iter().map(|slot| slot.limit.unwrap_or(0)).collect();
     let tokens: Vec<u64> = actions().map(|action| action.token as u64).collect();
     let parameters: Vec<f64> = actions().map(|action| action.parameter).collect();
     content.insert("environments.rng", &[slots.len(), RNG_BYTES], &rngs);
     content.insert("environments.seed", &[slots.len()], &seeds);
     content.insert("environments.length", &[slots.len()], &lengths);
+    content.insert("environments.limit", &[slots.len()], &limits);
     content.insert("environments.token", &[tokens.len()], &tokens);
     content.insert("environments.parameter", &[parameters.len()], &parameters);
     store::write_atomically(path, &content.to_bytes()?)
@@ -200,10 +203,12 @@ fn slots(content: &Content, path: &Path) -> Result<Vec<SlotState>> {
     let rngs: Vec<u8> = content.numbers("environments.rng", path)?;
     let seeds: Vec<u64> = content.numbers("environments.seed", path)?;
     let lengths: Vec<u64> = content.numbers("environments.length", path)?;
+    let limits: Vec<u64> = content.numbers("environments.limit", path)?;
     let tokens: Vec<u64> = content.numbers("environments.token", path)?;
     let parameters: Vec<f64> = content.numbers("environments.parameter", path)?;
     let consistent = rngs.len() == seeds.len() * RNG_BYTES
         && lengths.len() == seeds.len()
+        && limits.len() == seeds.len()
         && lengths.iter().sum::<u64>() == tokens.len() as u64
         && tokens.len() == parameters.len();
     if !consistent {
@@ -213,11 +218,13 @@ fn slots(content: &Content, path: &Path) -> Result<Vec<SlotState>> {
     let mut actions =
         tokens.iter().zip(&parameters).map(|(&token, &parameter)| Action { token: token as usize, parameter });
     let mut slots = Vec::with_capacity(seeds.len());
-    for ((rng, seed), length) in rngs.chunks(RNG_BYTES).zip(seeds).zip(lengths) {
+    let rows = rngs.chunks(RNG_BYTES).zip(seeds).zip(lengths).zip(limits);
+    for (((rng, seed), length), limit) in rows {
         slots.push(SlotState {
             rng: rng_from(rng, path)?,
             seed,
             actions: actions.by_ref().take(length as usize).collect(),
+            limit: (limit > 0).then_some(limit),
         });
     }
     Ok(slots)

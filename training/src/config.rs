@@ -81,11 +81,14 @@ pub struct RolloutConfig {
     pub environments: usize,
     /// Environments stepped in lockstep with one inference; divides `environments`.
     pub group: usize,
+    /// Each environment's first episode is cut off after a random number of decisions up to this, so that later ones do
+    /// not end together; 0 cuts none off.
+    pub stagger: u64,
 }
 
 impl Default for RolloutConfig {
     fn default() -> RolloutConfig {
-        RolloutConfig { environments: 64, group: 32 }
+        RolloutConfig { environments: 64, group: 32, stagger: 0 }
     }
 }
 

@@ -45,6 +45,8 @@ pub struct Slot {
     rng: ChaCha8Rng,
     seed: u64,
     actions: Vec<Action>,
+    /// Decisions after which the present episode is cut off before its end.
+    limit: Option<u64>,
     tally: Tally,
 }
 
@@ -57,16 +59,20 @@ pub struct SlotState {
     pub seed: u64,
     /// Actions taken in it.
     pub actions: Vec<Action>,
+    /// Decisions after which it is cut off before its end.
+    pub limit: Option<u64>,
 }
 
 impl Slot {
-    /// Begins a first episode; streams of one seed are independent of each other.
-    pub fn new(mut environment: Box<dyn Environment>, seed: u64, stream: u64) -> Result<Slot> {
+    /// Begins a first episode, cut off after at most `stagger` decisions if that is not 0; streams of one seed are
+    /// independent of each other.
+    pub fn new(mut environment: Box<dyn Environment>, seed: u64, stream: u64, stagger: u64) -> Result<Slot> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
         let first = rng.random();
         environment.reset(first)?;
-        Ok(Slot { environment, rng, seed: first, actions: Vec::new(), tally: Tally::default() })
+        let limit = (stagger > 0).then(|| rng.random_range(1..=stagger));
+        Ok(Slot { environment, rng, seed: first, actions: Vec::new(), limit, tally: Tally::default() })
     }
 
     /// Brings an environment back to a saved state. Should an environment that has changed since
@@ -77,6 +83,7 @@ impl Slot {
             rng: state.rng,
             seed: state.seed,
             actions: Vec::with_capacity(state.actions.len()),
+            limit: state.limit,
             tally: Tally::default(),
         };
         slot.environment.reset(slot.seed)?;
@@ -91,12 +98,15 @@ impl Slot {
 
     /// What must be saved.
     pub fn state(&self) -> SlotState {
-        SlotState { rng: self.rng.clone(), seed: self.seed, actions: self.actions.clone() }
+        SlotState { rng: self.rng.clone(), seed: self.seed, actions: self.actions.clone(), limit: self.limit }
     }
 
     fn step(&mut self, action: Action) -> Result<crate::environment::Outcome> {
-        let outcome = self.environment.step(action)?;
+        let mut outcome = self.environment.step(action)?;
         self.actions.push(action);
+        if outcome.progress == Progress::Continues && self.limit == Some(self.actions.len() as u64) {
+            outcome.progress = Progress::Truncated;
+        }
         self.tally += Tally {
             reward: outcome.reward,
             duration_s: outcome.duration_s,
@@ -107,12 +117,13 @@ impl Slot {
         Ok(outcome)
     }
 
-    /// Begins the next episode and returns what the last one brought.
-    fn begin(&mut self) -> Result<Tally> {
+    /// Begins the next episode and returns what the last one brought, unless it was cut off before its end.
+    fn begin(&mut self) -> Result<Option<Tally>> {
         self.seed = self.rng.random();
         self.environment.reset(self.seed)?;
         self.actions.clear();
-        Ok(std::mem::take(&mut self.tally))
+        let tally = std::mem::take(&mut self.tally);
+        Ok(self.limit.take().is_none().then_some(tally))
     }
 }
 
@@ -239,7 +250,7 @@ impl Group {
                 last.note(slot, self.shape, (index, decisions[index].len() - 1))?;
             }
             if outcome.progress != Progress::Continues {
-                segment.finished.push(slot.begin()?);
+                segment.finished.extend(slot.begin()?);
             }
         }
         Ok(())

@@ -95,7 +95,7 @@ impl Trainer {
         let streams = 0..run.rollout.environments as u64;
         let slots: Vec<Slot> = streams
             .into_par_iter()
-            .map(|index| Slot::new(environment(&run)?, run.seed, STREAM_ENVIRONMENTS + index))
+            .map(|index| Slot::new(environment(&run)?, run.seed, STREAM_ENVIRONMENTS + index, run.rollout.stagger))
             .collect::<Result<_>>()?;
         Ok(Trainer {
             groups: grouped(slots, &run, &network),

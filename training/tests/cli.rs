@@ -15,7 +15,7 @@ steps = 400
 checkpoint_every = 100
 environment = { kind = "toy", tokens = 4 }
 network = { kind = "hop-ppo-mlp", encoder = [8], discrete = [8], continuous = [8], critic = [8] }
-rollout = { environments = 4, group = 2 }
+rollout = { environments = 4, group = 2, stagger = 15 }
 ppo = { batch = 40, minibatch = 20, epochs = 2, learning_rate = 1e-3, learning_rate_end = 1e-4 }
 "#;
 

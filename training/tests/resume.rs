@@ -17,7 +17,7 @@ seed = 3
 steps = 1000
 environment = { kind = "toy", tokens = 4 }
 network = { kind = "hop-ppo", dim = 8, heads = 2, layers = 1, feed_forward = 8, head = "pointer", discrete = [8], continuous = [8], critic = [8] }
-rollout = { environments = 4, group = 2 }
+rollout = { environments = 4, group = 2, stagger = 15 }
 ppo = { batch = 60, minibatch = 16, epochs = 2, learning_rate = 1e-3, learning_rate_end = 1e-4, kl_penalty = { coefficient = 0.2, target = 0.01 } }
 "#;
 
