@@ -1,5 +1,5 @@
 //! Bad input: each a clear error, an exit code, and no mission harmed.
-#![allow(missing_docs, reason = "a test")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 mod common;
 

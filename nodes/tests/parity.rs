@@ -1,6 +1,6 @@
 //! The strongest test of the suite: a mission over DDS in lockstep and the same one in one process give the same tasks,
 //! results and rewards, bit for bit.
-#![allow(missing_docs, reason = "a test")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 mod common;
 

@@ -1,5 +1,5 @@
 //! An outside ROS 2 peer (CycloneDDS) receives states and status, and submits strips that are then imaged.
-#![allow(missing_docs, reason = "a test")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 mod common;
 

@@ -1,5 +1,5 @@
 //! Hot paths: a closed-loop tick, an environment step, windows, the observation.
-#![allow(missing_docs, reason = "criterion makes the functions")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a bench")]
 
 use std::hint::black_box;
 use std::sync::Arc;

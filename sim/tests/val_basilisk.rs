@@ -1,6 +1,6 @@
 //! Basilisk's closed-loop histories, flown again by this crate.
 #![expect(non_snake_case, reason = "frame letters")]
-#![allow(missing_docs, reason = "a test")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 #[expect(dead_code, reason = "the command-line tool prints more")]
 #[path = "../examples/compare_basilisk/history.rs"]

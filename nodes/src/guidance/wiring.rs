@@ -146,7 +146,7 @@ impl GuidanceNode {
     fn send(&self, command: &Command) -> Result<()> {
         self.base.set_now(command.tick);
         self.torques.publish(&to_msg::wheel_torque(&self.base.stamper, command))?;
-        if command.tick.0 % self.status_every == 0 {
+        if command.tick.0.is_multiple_of(self.status_every) {
             let strip = self.logic.strip().map(|(id, name)| (id.0, name.as_str()));
             self.status.publish(&to_msg::guidance_status(&self.base.stamper, command, strip))?;
         }

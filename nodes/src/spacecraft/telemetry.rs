@@ -42,7 +42,7 @@ impl Telemetry {
     /// # Errors
     /// When it cannot be sent.
     pub fn publish(&self, base: &MissionNode, sample: &StateSample) -> Result<()> {
-        if sample.tick.0 % self.every != 0 {
+        if !sample.tick.0.is_multiple_of(self.every) {
             return Ok(());
         }
         let (cos, sin) = base.model.earth.clone().cos_sin(sample.tick);

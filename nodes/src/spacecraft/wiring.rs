@@ -145,7 +145,7 @@ impl SpacecraftNode {
     fn publish(&mut self, sample: &StateSample) -> Result<()> {
         self.base.set_now(sample.tick);
         let state = to_msg::spacecraft_state(&self.base.stamper, sample);
-        self.clock.publish(&Clock { clock: state.header.stamp.clone() })?;
+        self.clock.publish(&Clock { clock: state.header.stamp })?;
         self.states.publish(&state)?;
         if self.unanswered.len() == IN_FLIGHT {
             self.unanswered.pop_front();
