@@ -9,16 +9,18 @@ use serde::Serialize;
 use swath_sim::config::SimConfig;
 use swath_sim::env::{Env, EpisodeConfig, Totals};
 use swath_sim::model::Model;
-use swath_sim::planner::{Heuristic, Planner, Random};
+use swath_sim::planner::{Heuristic, Lookahead, Planner, Random};
 
 use crate::error::{Result, TrainingError};
 use crate::policy::{LearnedPlanner, Policy};
 
-/// A planner by name: `random`, `heuristic:T` with T in seconds, or `KIND:FILE` with a policy file.
+/// A planner by name: `random`, `lookahead`, `heuristic:T` with T in seconds, or `KIND:FILE` with a policy file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PlannerSpec {
     /// Uniformly random strip and transition.
     Random,
+    /// Flies each candidate in its head before it decides.
+    Lookahead,
     /// Fixed transition time [s].
     Heuristic(f64),
     /// A trained policy.
@@ -36,6 +38,7 @@ impl FromStr for PlannerSpec {
     fn from_str(text: &str) -> std::result::Result<PlannerSpec, String> {
         match text.split_once(':') {
             None if text == "random" => Ok(PlannerSpec::Random),
+            None if text == "lookahead" => Ok(PlannerSpec::Lookahead),
             Some(("heuristic", seconds)) => match seconds.parse::<f64>() {
                 Ok(seconds) if (0.0..=600.0).contains(&seconds) => Ok(PlannerSpec::Heuristic(seconds)),
                 _ => Err(format!("{seconds} is not a transition time of 0 to 600 s")),
@@ -44,7 +47,7 @@ impl FromStr for PlannerSpec {
                 Ok(PlannerSpec::Learned { kind: kind.into(), path: path.into() })
             }
             _ => Err(format!(
-                "{text} is none of random, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE, discrete-ppo:FILE"
+                "{text} is none of random, lookahead, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE, discrete-ppo:FILE"
             )),
         }
     }
@@ -54,6 +57,7 @@ impl std::fmt::Display for PlannerSpec {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             PlannerSpec::Random => write!(f, "random"),
+            PlannerSpec::Lookahead => write!(f, "lookahead"),
             PlannerSpec::Heuristic(seconds) => write!(f, "heuristic:{seconds}"),
             PlannerSpec::Learned { kind, path } => write!(f, "{kind}:{}", path.display()),
         }
@@ -68,6 +72,7 @@ impl PlannerSpec {
     pub fn planner(&self, seed: u64) -> Result<Box<dyn Planner>> {
         Ok(match self {
             PlannerSpec::Random => Box::new(Random { seed }),
+            PlannerSpec::Lookahead => Box::new(Lookahead { margin: 0 }),
             PlannerSpec::Heuristic(t_pre_s) => Box::new(Heuristic { t_pre_s: *t_pre_s }),
             PlannerSpec::Learned { kind, path } => {
                 let policy = Policy::load(path)?;
@@ -220,6 +225,7 @@ mod tests {
         let read = |text: &str| text.parse::<PlannerSpec>();
         assert_eq!(read("heuristic:80"), Ok(PlannerSpec::Heuristic(80.0)));
         assert_eq!(read("random"), Ok(PlannerSpec::Random));
+        assert_eq!(read("lookahead"), Ok(PlannerSpec::Lookahead));
         let learned = read("h-ppo:folder/a.safetensors").unwrap();
         assert_eq!(learned.to_string(), "h-ppo:folder/a.safetensors");
         for wrong in ["heuristic", "heuristic:-1", "heuristic:nan", "ppo:x", ""] {

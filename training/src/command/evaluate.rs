@@ -38,7 +38,7 @@ pub struct MissionArgs {
 /// Options of `swath-train evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// A planner: random, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE or
+    /// A planner: random, lookahead, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE or
     /// discrete-ppo:FILE; may be given several times, the first is what others are compared with
     #[arg(long = "planner", required = true)]
     planners: Vec<PlannerSpec>,
