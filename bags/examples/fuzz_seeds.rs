@@ -39,15 +39,15 @@ fn write(dir: &Path, compression: Compression) {
     bag.close().unwrap();
 }
 
-/// Sets the checksums of chunks, data section and summary to zero.
+/// Sets the checksums of chunks (opcode 6), data section (15) and summary (2) to zero.
 fn clear_checksums(bytes: &mut [u8]) {
-    let mut at = mcap::MAGIC.len();
-    while at + 9 <= bytes.len() - mcap::MAGIC.len() {
+    let mut at = 8;
+    while at + 9 <= bytes.len() - 8 {
         let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
         let checksum = match bytes[at] {
-            mcap::records::op::CHUNK => Some(at + 9 + 24),
-            mcap::records::op::DATA_END => Some(at + 9),
-            mcap::records::op::FOOTER => Some(at + 9 + 16),
+            0x06 => Some(at + 9 + 24),
+            0x0f => Some(at + 9),
+            0x02 => Some(at + 9 + 16),
             _ => None,
         };
         if let Some(checksum) = checksum {

@@ -100,6 +100,9 @@ pub enum BagError {
         /// What is wrong.
         reason: String,
     },
+    /// ROS or DDS refused something.
+    #[error(transparent)]
+    Ros(Box<swath_ros::RosError>),
     /// An option or argument is out of its range or contradicts another.
     #[error("{option}: {reason}")]
     Option {

@@ -4,12 +4,14 @@
 //! `metadata.yaml`. This crate knows message types only by their schema texts.
 
 pub mod cli;
+mod date;
 mod error;
 mod file;
 pub mod metadata;
 pub mod ops;
 pub mod qos;
 mod reader;
+pub mod record;
 pub mod schema;
 mod topic;
 mod writer;
@@ -18,4 +20,4 @@ pub use error::{BagError, Result, chain};
 pub use file::chunk::Compression;
 pub use reader::{Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
 pub use topic::Topic;
-pub use writer::{BagOptions, BagSummary, BagWriter, Losses, RECORDING, TopicId};
+pub use writer::{BagOptions, BagSummary, BagWriter, Counter, Losses, RECORDING, TopicId};

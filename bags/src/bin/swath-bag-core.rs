@@ -3,7 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use swath_bags::{chain, cli::Command};
+use swath_bags::{BagError, chain, cli::Command};
+use swath_ros::RosArgs;
 
 /// Record, play and inspect rosbag2 bags over MCAP
 #[derive(Parser)]
@@ -14,11 +15,16 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    match Cli::parse().command.run() {
+    match run() {
         Ok(code) => code,
         Err(error) => {
             eprintln!("error: {}", chain(&error));
             ExitCode::FAILURE
         }
     }
+}
+
+fn run() -> Result<ExitCode, BagError> {
+    let (words, ros) = RosArgs::split(std::env::args())?;
+    Cli::parse_from(words).command.run(&ros)
 }

@@ -40,16 +40,14 @@ impl Selection {
     /// The filter for a bag, whose start `+` times refer to.
     pub(super) fn filter(&self, bag: &Bag) -> Result<Filter> {
         let start = bag.time_range().map_or(0, |(start, _)| start);
-        let time = |option: &'static str, text: &Option<String>, otherwise: u64| match text {
-            None => Ok(otherwise),
-            Some(text) => {
-                let (base, number) = match text.strip_prefix('+') {
-                    Some(number) => (start, number),
-                    None => (0, text.as_str()),
-                };
-                let ns = seconds(number).map_err(|reason| BagError::Option { option, reason })?;
-                Ok(base.saturating_add(ns))
-            }
+        let time = |option: &'static str, text: &Option<String>, otherwise: u64| -> Result<u64> {
+            let Some(text) = text else { return Ok(otherwise) };
+            let (base, number) = match text.strip_prefix('+') {
+                Some(number) => (start, number),
+                None => (0, text.as_str()),
+            };
+            let ns = seconds(number).map_err(|reason| BagError::Option { option, reason })?;
+            Ok(base.saturating_add(ns))
         };
         Ok(Filter {
             topics: TopicPattern::new(&self.topic, self.regex.as_deref(), self.exclude.as_deref())?,

@@ -2,6 +2,7 @@
 
 mod copy;
 mod inspect;
+mod record;
 
 use std::{
     io::{self, Write},
@@ -9,12 +10,16 @@ use std::{
 };
 
 use clap::Subcommand;
+pub use record::{MANIFEST, MANIFEST_TEXT};
+use swath_ros::RosArgs;
 
 use crate::error::{BagError, Result};
 
 /// The commands of `swath-bag` that need no simulation.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Record topics into a new bag
+    Record(record::RecordArgs),
     /// Tell what is in a bag: topics, times, counts, and the mission's facts
     Info(inspect::InfoArgs),
     /// Print messages as JSON lines
@@ -30,14 +35,16 @@ pub enum Command {
 }
 
 impl Command {
-    /// Runs the command; results go to stdout, progress and warnings to stderr.
+    /// Runs the command; results go to stdout, progress and warnings to stderr. `ros` is what stood
+    /// after `--ros-args`, see [`RosArgs::split`].
     ///
     /// The exit code is not 0 where the command ran and found a fault.
     ///
     /// # Errors
     /// Whatever kept the command from running to its end.
-    pub fn run(self) -> Result<ExitCode> {
+    pub fn run(self, ros: &RosArgs) -> Result<ExitCode> {
         let result = match self {
+            Self::Record(args) => args.run(ros),
             Self::Info(args) => args.run(),
             Self::Cat(args) => args.run(),
             Self::Validate(args) => args.run(),

@@ -2,9 +2,10 @@
 
 use std::{io::Write, str::FromStr, time::Instant};
 
-use mcap::records::{self, MessageHeader};
-
-use super::record;
+use super::{
+    record,
+    records::{MessageHeader, op},
+};
 use crate::error::BagError;
 
 /// How chunks are compressed.
@@ -88,7 +89,7 @@ impl Chunk {
         let mut prefix = [0; record::PREFIX_LEN + record::MESSAGE_HEADER_LEN];
         let payload_len: usize = payload.iter().map(|part| part.len()).sum();
         let body_len = (record::MESSAGE_HEADER_LEN + payload_len) as u64;
-        prefix[0] = records::op::MESSAGE;
+        prefix[0] = op::MESSAGE;
         prefix[1..9].copy_from_slice(&body_len.to_le_bytes());
         prefix[9..11].copy_from_slice(&header.channel_id.to_le_bytes());
         prefix[11..15].copy_from_slice(&header.sequence.to_le_bytes());

@@ -2,10 +2,9 @@
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-use mcap::records::{self, ChunkHeader, Record, op};
-
 use super::{
-    record::{self, FOOTER_LEN, PREFIX_LEN, Records},
+    record::{FOOTER_LEN, PREFIX_LEN, Records},
+    records::{self, Body, Chunk, MAGIC, Schema, op},
     scan::{Place, Places, Source},
     unpack::Unpacker,
 };
@@ -13,14 +12,6 @@ use crate::error::Result;
 
 /// Messages of a run of loose records (outside chunks) that are read at a time [bytes].
 const LOOSE_BYTES: u64 = 1 << 20;
-
-/// A schema record.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct Schema {
-    pub name: String,
-    pub encoding: String,
-    pub data: Vec<u8>,
-}
 
 /// Where messages lie: a chunk, or a run of message records outside chunks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,7 +87,7 @@ impl FileIndex {
 
     /// Messages in the file.
     pub(crate) fn messages(&self) -> u64 {
-        self.counts.values().sum()
+        self.counts.values().fold(0, |sum, n| sum.saturating_add(*n))
     }
 
     fn read_footer(&self) -> Result<records::Footer> {
@@ -107,12 +98,9 @@ impl FileIndex {
         };
         let mut tail = [0; FOOTER_LEN as usize];
         self.source.read_at(at, &mut tail)?;
-        let (record, magic) = tail.split_at(tail.len() - mcap::MAGIC.len());
-        match (Records::new(record).next(), magic == mcap::MAGIC) {
-            (Some(Ok((0, op::FOOTER, body))), true) => match record::parse(op::FOOTER, body) {
-                Ok(Record::Footer(footer)) => Ok(footer),
-                _ => Err(self.source.corrupt(at, "footer cannot be parsed")),
-            },
+        let (record, magic) = tail.split_at(tail.len() - MAGIC.len());
+        match (Records::new(record).next(), magic == MAGIC) {
+            (Some(Ok((0, op::FOOTER, body))), true) => self.parse(at, body),
             _ => Err(self.source.corrupt(len, missing)),
         }
     }
@@ -121,7 +109,7 @@ impl FileIndex {
     fn read_summary(&mut self, footer: &records::Footer) -> Result<bool> {
         let start = footer.summary_start;
         let end = self.source.len - FOOTER_LEN;
-        if start < mcap::MAGIC.len() as u64 || start > end {
+        if start < MAGIC.len() as u64 || start > end {
             let reason = format!("summary said to start at {start}, outside of the file");
             return Err(self.source.corrupt(end, reason));
         }
@@ -137,10 +125,10 @@ impl FileIndex {
         for item in Records::new(&section[..(end - start) as usize]) {
             let (at, opcode, body) = item.map_err(|(at, reason)| self.source.corrupt(start + at as u64, reason))?;
             let offset = start + at as u64;
-            match self.parse(offset, opcode, body)? {
-                Record::Statistics(found) => statistics = Some(found),
-                Record::ChunkIndex(chunk) => self.add_chunk_index(offset, &chunk)?,
-                Record::MetadataIndex(metadata) => self.read_metadata(&metadata)?,
+            match opcode {
+                op::STATISTICS => statistics = Some(self.parse::<records::Statistics>(offset, body)?),
+                op::CHUNK_INDEX => self.add_chunk_index(offset, &self.parse(offset, body)?)?,
+                op::METADATA_INDEX => self.read_metadata(&self.parse(offset, body)?)?,
                 _ => self.add(Place { offset, opcode, body_len: body.len() as u64 }, body)?,
             }
         }
@@ -162,8 +150,8 @@ impl FileIndex {
         false
     }
 
-    fn parse<'b>(&self, offset: u64, opcode: u8, body: &'b [u8]) -> Result<Record<'b>> {
-        record::parse(opcode, body).map_err(|reason| self.source.corrupt(offset, reason))
+    fn parse<T: Body>(&self, offset: u64, body: &[u8]) -> Result<T> {
+        T::parse(body).map_err(|reason| self.source.corrupt(offset, reason))
     }
 
     fn add_chunk_index(&mut self, offset: u64, chunk: &records::ChunkIndex) -> Result<()> {
@@ -191,19 +179,20 @@ impl FileIndex {
 
     /// Takes in a header, schema, channel or metadata record; ignores others.
     pub(crate) fn add(&mut self, place: Place, body: &[u8]) -> Result<()> {
-        match self.parse(place.offset, place.opcode, body)? {
-            Record::Header(header) => {
+        match place.opcode {
+            op::HEADER => {
+                let header: records::Header = self.parse(place.offset, body)?;
                 (self.profile, self.library) = (header.profile, header.library);
             }
-            Record::Schema { header, data } => {
-                let data = data.into_owned();
-                let schema = Schema { name: header.name, encoding: header.encoding, data };
-                self.schemas.insert(header.id, schema);
+            op::SCHEMA => {
+                let schema: Schema = self.parse(place.offset, body)?;
+                self.schemas.insert(schema.id, schema);
             }
-            Record::Channel(channel) => {
+            op::CHANNEL => {
+                let channel: records::Channel = self.parse(place.offset, body)?;
                 self.channels.insert(channel.id, channel);
             }
-            Record::Metadata(metadata) => self.metadata.push(metadata),
+            op::METADATA => self.metadata.push(self.parse(place.offset, body)?),
             _ => {}
         }
         Ok(())
@@ -223,8 +212,8 @@ impl FileIndex {
             }
             match place.opcode {
                 op::CHUNK => {
-                    let header = unpack(&source, place, &body, &mut unpacker, &mut data)?;
-                    self.add_chunk(place, &header, &data)?;
+                    let chunk = unpack(&source, place, &body, &mut unpacker, &mut data)?;
+                    self.add_chunk(place, &chunk, &data)?;
                 }
                 op::MESSAGE => self.add_loose(place, &body)?,
                 _ => self.add(place, &body)?,
@@ -234,7 +223,7 @@ impl FileIndex {
     }
 
     /// Takes in a chunk whose records are in `data`.
-    pub(crate) fn add_chunk(&mut self, place: Place, header: &ChunkHeader, data: &[u8]) -> Result<()> {
+    pub(crate) fn add_chunk(&mut self, place: Place, chunk: &Chunk<'_>, data: &[u8]) -> Result<()> {
         for item in Records::new(data) {
             let (at, opcode, body) =
                 item.map_err(|(at, reason)| self.source.corrupt(place.offset, format!("chunk, byte {at}: {reason}")))?;
@@ -248,9 +237,9 @@ impl FileIndex {
             }
         }
         let len = place.end() - place.offset;
-        let (start, end) = (header.message_start_time, header.message_end_time);
+        let (start, end) = (chunk.message_start_time, chunk.message_end_time);
         self.chunks.push(ChunkRef { offset: place.offset, len, start, end, loose: false });
-        *self.compressions.entry(header.compression.clone()).or_insert(0) += 1;
+        *self.compressions.entry(chunk.compression.to_string()).or_insert(0) += 1;
         Ok(())
     }
 
@@ -294,21 +283,17 @@ pub(crate) fn load(
 }
 
 /// Unpacks the body of a chunk record into `data`.
-pub(crate) fn unpack(
+pub(crate) fn unpack<'b>(
     source: &Source,
     place: Place,
-    body: &[u8],
+    body: &'b [u8],
     unpacker: &mut Unpacker,
     data: &mut Vec<u8>,
-) -> Result<ChunkHeader> {
+) -> Result<Chunk<'b>> {
     let corrupt = |reason: String| source.corrupt(place.offset, reason);
-    match record::parse(op::CHUNK, body).map_err(corrupt)? {
-        Record::Chunk { header, data: packed } => {
-            unpacker.unpack(&header, &packed, data).map_err(corrupt)?;
-            Ok(header)
-        }
-        _ => Err(corrupt("no chunk record".to_owned())),
-    }
+    let chunk = Chunk::parse(body).map_err(corrupt)?;
+    unpacker.unpack(&chunk, data).map_err(corrupt)?;
+    Ok(chunk)
 }
 
 /// The header of a message record's body.

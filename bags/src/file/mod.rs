@@ -3,6 +3,7 @@
 pub(crate) mod chunk;
 pub(crate) mod index;
 pub(crate) mod record;
+pub(crate) mod records;
 pub(crate) mod scan;
 pub(crate) mod unpack;
 pub(crate) mod writer;

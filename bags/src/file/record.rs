@@ -1,16 +1,11 @@
 //! MCAP records as bytes: an opcode, a length, a body.
 
-use std::{borrow::Cow, io::Cursor};
-
-use binrw::BinWrite;
-use mcap::records::{self, Record};
-
-use crate::error::chain;
+use super::records::{Body, MAGIC};
 
 /// Opcode and length.
 pub(crate) const PREFIX_LEN: usize = 9;
 /// Footer record and end magic.
-pub(crate) const FOOTER_LEN: u64 = (PREFIX_LEN + 20 + mcap::MAGIC.len()) as u64;
+pub(crate) const FOOTER_LEN: u64 = (PREFIX_LEN + 20 + MAGIC.len()) as u64;
 /// Channel, sequence and two times of a message record's body.
 pub(crate) const MESSAGE_HEADER_LEN: usize = 22;
 
@@ -24,53 +19,9 @@ pub(crate) fn put(out: &mut Vec<u8>, opcode: u8, body: impl FnOnce(&mut Vec<u8>)
     out[start + 1..start + PREFIX_LEN].copy_from_slice(&len.to_le_bytes());
 }
 
-/// Appends a record made from one of `mcap`'s structs.
-pub(crate) fn put_struct<T>(out: &mut Vec<u8>, opcode: u8, value: &T)
-where
-    T: for<'a> BinWrite<Args<'a> = ()>,
-{
-    put(out, opcode, |out| out.extend_from_slice(&to_bytes(value)));
-}
-
-/// The little-endian bytes of one of `mcap`'s structs.
-fn to_bytes<T>(value: &T) -> Vec<u8>
-where
-    T: for<'a> BinWrite<Args<'a> = ()>,
-{
-    let mut body = Cursor::new(Vec::new());
-    match value.write_le(&mut body) {
-        Ok(()) => body.into_inner(),
-        // A `Vec` takes every byte, and these structs have no failing conversions.
-        Err(error) => unreachable!("serialising into memory failed: {error}"),
-    }
-}
-
-/// Appends a length-prefixed string.
-pub(crate) fn put_string(out: &mut Vec<u8>, text: &str) {
-    out.extend_from_slice(&(text.len() as u32).to_le_bytes());
-    out.extend_from_slice(text.as_bytes());
-}
-
-/// Appends a schema record.
-pub(crate) fn put_schema(out: &mut Vec<u8>, id: u16, name: &str, encoding: &str, data: &[u8]) {
-    put(out, records::op::SCHEMA, |out| {
-        out.extend_from_slice(&id.to_le_bytes());
-        put_string(out, name);
-        put_string(out, encoding);
-        out.extend_from_slice(&(data.len() as u32).to_le_bytes());
-        out.extend_from_slice(data);
-    });
-}
-
-/// Parses a record's body.
-///
-/// # Errors
-/// The reason in words; attachments are not parsed, they come back as unknown records.
-pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
-    if opcode == records::op::ATTACHMENT {
-        return Ok(Record::Unknown { opcode, data: Cow::Borrowed(body) });
-    }
-    mcap::parse_record(opcode, body).map_err(|e| format!("record with opcode {opcode:#04x}: {}", chain(&e)))
+/// Appends a record.
+pub(crate) fn put_body<T: Body>(out: &mut Vec<u8>, body: &T) {
+    put(out, T::OPCODE, |out| body.put(out));
 }
 
 /// A record's prefix: opcode and body length.

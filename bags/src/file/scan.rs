@@ -6,10 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use mcap::records::op;
-
 use super::{
     record::{self, PREFIX_LEN},
+    records::{MAGIC, op},
     unpack::MAX_CHUNK_BYTES,
 };
 use crate::error::{BagError, Result};
@@ -28,11 +27,11 @@ impl Source {
         let file = File::open(path).map_err(BagError::io("open", path))?;
         let len = file.metadata().map_err(BagError::io("read", path))?.len();
         let source = Self { path: path.to_owned(), len, file };
-        let mut magic = [0; mcap::MAGIC.len()];
+        let mut magic = [0; MAGIC.len()];
         if len >= magic.len() as u64 {
             source.read_at(0, &mut magic)?;
         }
-        if magic != *mcap::MAGIC {
+        if magic != *MAGIC {
             return Err(source.corrupt(0, "no MCAP file: it does not start with MCAP's magic"));
         }
         Ok(source)
@@ -110,7 +109,7 @@ pub(crate) struct Places<'a> {
 impl<'a> Places<'a> {
     /// Starts behind the magic.
     pub(crate) fn new(source: &'a Source) -> Self {
-        Self { source, offset: mcap::MAGIC.len() as u64, ended: false }
+        Self { source, offset: MAGIC.len() as u64, ended: false }
     }
 
     fn place(&self) -> Result<Place> {

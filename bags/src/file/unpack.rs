@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use mcap::records::ChunkHeader;
+use super::records::Chunk;
 
 /// Largest chunk that is read, packed or unpacked [bytes].
 ///
@@ -20,20 +20,20 @@ impl Unpacker {
     ///
     /// # Errors
     /// The reason in words: size, compression, damaged data or checksum.
-    pub(crate) fn unpack(&mut self, header: &ChunkHeader, packed: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
-        let size = header.uncompressed_size;
+    pub(crate) fn unpack(&mut self, chunk: &Chunk<'_>, out: &mut Vec<u8>) -> Result<(), String> {
+        let (size, packed) = (chunk.uncompressed_size, chunk.records);
         if size > MAX_CHUNK_BYTES {
             return Err(format!("chunk of {size} bytes is larger than {MAX_CHUNK_BYTES}"));
         }
         out.clear();
-        match header.compression.as_str() {
+        match chunk.compression.as_ref() {
             "" => out.extend_from_slice(packed),
             "lz4" => {
                 let mut decoder = lz4_flex::frame::FrameDecoder::new(packed).take(size + 1);
                 decoder.read_to_end(out).map_err(|e| format!("lz4: {e}"))?;
             }
             "zstd" => {
-                out.reserve_exact(size as usize);
+                out.try_reserve_exact(size as usize).map_err(|e| format!("chunk of {size} bytes: {e}"))?;
                 self.zstd()?.decompress_to_buffer(packed, out).map_err(|e| format!("zstd: {e}"))?;
             }
             other => return Err(format!("unknown compression {other:?}")),
@@ -42,8 +42,8 @@ impl Unpacker {
             return Err(format!("chunk unpacks to {} bytes, its header says {size}", out.len()));
         }
         let crc = crc32fast::hash(out);
-        if header.uncompressed_crc != 0 && header.uncompressed_crc != crc {
-            let saved = header.uncompressed_crc;
+        let saved = chunk.uncompressed_crc;
+        if saved != 0 && saved != crc {
             return Err(format!("chunk checksum is {crc:08x}, its header says {saved:08x}"));
         }
         Ok(())

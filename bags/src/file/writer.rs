@@ -2,11 +2,10 @@
 
 use std::{collections::BTreeMap, fs::File, io, os::unix::fs::FileExt};
 
-use mcap::records::{self, op};
-
 use super::{
     chunk::{Chunk, Compressor},
     record,
+    records::{self, MAGIC, op},
 };
 use crate::topic::Topic;
 
@@ -83,8 +82,8 @@ impl FileWriter {
             profile: "ros2".to_owned(),
             library: concat!("swath-bags ", env!("CARGO_PKG_VERSION")).to_owned(),
         };
-        file.scratch.extend_from_slice(mcap::MAGIC);
-        record::put_struct(&mut file.scratch, op::HEADER, &header);
+        file.scratch.extend_from_slice(MAGIC);
+        record::put_body(&mut file.scratch, &header);
         file.append_scratch()?;
         Ok(file)
     }
@@ -105,9 +104,13 @@ impl FileWriter {
     pub(crate) fn add_topic(&mut self, topic: &Topic, ids: TopicIds) -> io::Result<()> {
         self.scratch.clear();
         if ids.new_schema {
-            let encoding = if topic.schema.is_empty() { "" } else { "ros2msg" };
-            let data = topic.schema.as_bytes();
-            record::put_schema(&mut self.scratch, ids.schema, &topic.type_name, encoding, data);
+            let schema = records::Schema {
+                id: ids.schema,
+                name: topic.type_name.clone(),
+                encoding: topic.schema_encoding.clone(),
+                data: topic.schema.clone().into_bytes(),
+            };
+            record::put_body(&mut self.scratch, &schema);
         }
         let metadata = BTreeMap::from([
             ("offered_qos_profiles".to_owned(), topic.qos_yaml.clone()),
@@ -120,7 +123,7 @@ impl FileWriter {
             message_encoding: topic.message_encoding.clone(),
             metadata,
         };
-        record::put_struct(&mut self.scratch, op::CHANNEL, &channel);
+        record::put_body(&mut self.scratch, &channel);
         self.append_scratch()?;
         self.definitions.extend_from_slice(&self.scratch);
         self.schemas += u16::from(ids.new_schema);
@@ -132,7 +135,7 @@ impl FileWriter {
     pub(crate) fn add_metadata(&mut self, metadata: &records::Metadata) -> io::Result<()> {
         let offset = self.len;
         self.scratch.clear();
-        record::put_struct(&mut self.scratch, op::METADATA, metadata);
+        record::put_body(&mut self.scratch, metadata);
         self.append_scratch()?;
         let length = self.len - offset;
         self.metadata.push(records::MetadataIndex { offset, length, name: metadata.name.clone() });
@@ -145,15 +148,15 @@ impl FileWriter {
         let packed = compressor.compress(&chunk.data)?;
         let out = &mut self.scratch;
         out.clear();
-        record::put(out, op::CHUNK, |out| {
-            out.extend_from_slice(&chunk.start.to_le_bytes());
-            out.extend_from_slice(&chunk.end.to_le_bytes());
-            out.extend_from_slice(&(chunk.data.len() as u64).to_le_bytes());
-            out.extend_from_slice(&crc32fast::hash(&chunk.data).to_le_bytes());
-            record::put_string(out, compression);
-            out.extend_from_slice(&(packed.len() as u64).to_le_bytes());
-            out.extend_from_slice(packed);
-        });
+        let stored = records::Chunk {
+            message_start_time: chunk.start,
+            message_end_time: chunk.end,
+            uncompressed_size: chunk.data.len() as u64,
+            uncompressed_crc: crc32fast::hash(&chunk.data),
+            compression: compression.into(),
+            records: packed,
+        };
+        record::put(out, op::CHUNK, |out| stored.put(out));
         let chunk_length = out.len() as u64;
         let compressed_size = packed.len() as u64;
         let message_index_offsets = put_message_indexes(out, chunk, self.len);
@@ -196,13 +199,13 @@ impl FileWriter {
         let summary = self.summary();
         self.scratch.clear();
         let data_section_crc = self.crc.clone().finalize();
-        record::put_struct(&mut self.scratch, op::DATA_END, &records::DataEnd { data_section_crc });
+        record::put_body(&mut self.scratch, &records::DataEnd { data_section_crc });
         let data_end_len = self.scratch.len();
         let groups = self.put_summary(&summary);
         let summary_start = self.len + data_end_len as u64;
         let summary_offset_start = self.len + self.scratch.len() as u64;
         for group in groups {
-            record::put_struct(&mut self.scratch, op::SUMMARY_OFFSET, &group);
+            record::put_body(&mut self.scratch, &group);
         }
         self.put_footer(data_end_len, summary_start, summary_offset_start);
         self.append_scratch()?;
@@ -244,16 +247,16 @@ impl FileWriter {
             group(opcode, from, out.len());
         }
         let from = out.len();
-        record::put_struct(out, op::STATISTICS, &statistics);
+        record::put_body(out, &statistics);
         group(op::STATISTICS, from, out.len());
         let from = out.len();
         for chunk in &self.chunks {
-            record::put_struct(out, op::CHUNK_INDEX, &chunk.index);
+            record::put_body(out, &chunk.index);
         }
         group(op::CHUNK_INDEX, from, out.len());
         let from = out.len();
         for metadata in &self.metadata {
-            record::put_struct(out, op::METADATA_INDEX, metadata);
+            record::put_body(out, metadata);
         }
         group(op::METADATA_INDEX, from, out.len());
         groups
@@ -277,11 +280,11 @@ impl FileWriter {
     fn put_footer(&mut self, data_end_len: usize, summary_start: u64, summary_offset_start: u64) {
         let out = &mut self.scratch;
         let footer = records::Footer { summary_start, summary_offset_start, summary_crc: 0 };
-        record::put_struct(out, op::FOOTER, &footer);
+        record::put_body(out, &footer);
         let crc_at = out.len() - 4;
         let crc = crc32fast::hash(&out[data_end_len..crc_at]);
         out[crc_at..].copy_from_slice(&crc.to_le_bytes());
-        out.extend_from_slice(mcap::MAGIC);
+        out.extend_from_slice(MAGIC);
     }
 
     /// Writes the scratch buffer behind the file, or cuts the file back to where it was.

@@ -96,7 +96,7 @@ impl Display for Info {
         writeln!(f, "{:<19}mcap", "Storage id:")?;
         writeln!(f, "{:<19}{}", "Compression:", self.compressions.join(", "))?;
         writeln!(f, "{:<19}{}", "ROS Distro:", self.ros_distro)?;
-        writeln!(f, "{:<19}{}s", "Duration:", seconds(end - start))?;
+        writeln!(f, "{:<19}{}s", "Duration:", seconds(end.saturating_sub(start)))?;
         writeln!(f, "{:<19}{}", "Start:", date(start))?;
         writeln!(f, "{:<19}{}", "End:", date(end))?;
         writeln!(f, "{:<19}{}", "Messages:", self.messages)?;
@@ -157,37 +157,6 @@ fn seconds(ns: u64) -> String {
 
 /// `2026-01-31 12:00:00.000 UTC (1769860800.000000000)`.
 fn date(ns: u64) -> String {
-    let total_seconds = ns / 1_000_000_000;
-    let (days, of_day) = (total_seconds / 86_400, total_seconds % 86_400);
-    let (year, month, day) = civil(days);
-    let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
-    let milliseconds = ns / 1_000_000 % 1000;
-    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}.{milliseconds:03} UTC ({})", seconds(ns))
-}
-
-/// Year, month and day of a day since 1970-01-01, in the Gregorian calendar.
-///
-/// Hinnant, "chrono-Compatible Low-Level Date Algorithms", `civil_from_days`.
-fn civil(days: u64) -> (u64, u64, u64) {
-    let shifted = days + 719_468;
-    let (era, of_era) = (shifted / 146_097, shifted % 146_097);
-    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted_month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * shifted_month + 2) / 5 + 1;
-    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
-    (year_of_era + era * 400 + u64::from(month <= 2), month, day)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dates() {
-        assert_eq!(date(0), "1970-01-01 00:00:00.000 UTC (0.000000000)");
-        let leap_day = 1_709_210_096_789_000_001;
-        assert_eq!(date(leap_day), "2024-02-29 12:34:56.789 UTC (1709210096.789000001)");
-        assert_eq!(civil(20_818), (2026, 12, 31));
-    }
+    let day = crate::date::date(ns / 1_000_000_000);
+    format!("{day}.{:03} UTC ({})", ns / 1_000_000 % 1000, seconds(ns))
 }

@@ -2,14 +2,13 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use mcap::records::op;
-
 use super::copy::copy_metadata;
 use crate::{
     error::{Result, chain},
     file::{
-        index::{FileIndex, Schema, message_header, unpack},
+        index::{FileIndex, message_header, unpack},
         record::{MESSAGE_HEADER_LEN, Records},
+        records::{Schema, op},
         scan::{Place, Places, Source},
         unpack::Unpacker,
     },

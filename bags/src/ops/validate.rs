@@ -6,12 +6,14 @@ use serde::Serialize;
 
 use crate::{
     error::{BagError, Result, chain},
-    file::scan::{Places, Source},
+    file::{
+        records::{Body, DataEnd, MAGIC, op},
+        scan::{Places, Source},
+    },
     metadata::{BagInformation, FILE_NAME},
     ops::checks::TopicCheck,
     reader::{Bag, Filter},
 };
-use mcap::records::op;
 
 /// Faults of one kind that are written out before the rest is only counted.
 pub(super) const SHOWN: u64 = 5;
@@ -91,7 +93,7 @@ fn check_files(bag: &Bag, report: &mut Report) {
 fn check_data_section(path: &Path) -> Result<()> {
     let source = Source::open(path)?;
     let mut crc = crc32fast::Hasher::new();
-    crc.update(mcap::MAGIC);
+    crc.update(MAGIC);
     let mut bytes = Vec::new();
     for place in Places::new(&source) {
         let place = place?;
@@ -100,9 +102,8 @@ fn check_data_section(path: &Path) -> Result<()> {
             continue;
         }
         place.read_body(&source, &mut bytes)?;
-        let Some(saved) = bytes.first_chunk().map(|b| u32::from_le_bytes(*b)) else {
-            return Err(source.corrupt(place.offset, "data end record without checksum"));
-        };
+        let end = DataEnd::parse(&bytes).map_err(|reason| source.corrupt(place.offset, reason))?;
+        let saved = end.data_section_crc;
         let found = crc.finalize();
         if saved != 0 && saved != found {
             let reason = format!("data section checksum is {found:08x}, not {saved:08x}");
@@ -151,7 +152,7 @@ fn check_yaml(bag: &Bag, report: &mut Report) {
     differs("storage identifier", information.storage_identifier.clone(), "mcap".to_owned());
     differs("message count", information.message_count.to_string(), bag.message_count().to_string());
     differs("starting time", yaml_start.to_string(), start.to_string());
-    differs("duration", information.duration.nanoseconds.to_string(), (end - start).to_string());
+    differs("duration", information.duration.nanoseconds.to_string(), end.saturating_sub(start).to_string());
     let mut yaml: Vec<String> = information.relative_file_paths.clone();
     yaml.sort();
     let names = bag.files().into_iter().filter_map(|f| f.path.file_name().map(|n| n.to_owned()));

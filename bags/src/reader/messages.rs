@@ -8,10 +8,10 @@ use crate::{
     file::{
         index::{ChunkRef, load, message_header},
         record::{MESSAGE_HEADER_LEN, Records},
+        records::op,
         unpack::Unpacker,
     },
 };
-use mcap::records::op;
 
 /// Unpacked chunks that are kept at a time [bytes]; beyond it the ones needed last are dropped
 /// and read again when their turn comes.

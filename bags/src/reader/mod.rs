@@ -14,7 +14,10 @@ pub use select::{Filter, TopicPattern};
 
 use crate::{
     error::{BagError, Result},
-    file::index::{FileIndex, Schema},
+    file::{
+        index::FileIndex,
+        records::{Channel, Schema},
+    },
     metadata::{self, BagInformation},
     qos, schema,
     topic::Topic,
@@ -128,7 +131,8 @@ impl Bag {
             };
             let topic = channel_topic(channel, schema);
             let index = self.topic_index(topic);
-            self.topics[index].messages += file.counts.get(id).copied().unwrap_or(0);
+            let messages = &mut self.topics[index].messages;
+            *messages = messages.saturating_add(file.counts.get(id).copied().unwrap_or(0));
             by_channel.insert(*id, index);
         }
         self.channels.push(by_channel);
@@ -190,7 +194,7 @@ impl Bag {
 
     /// Messages in all files.
     pub fn message_count(&self) -> u64 {
-        self.topics.iter().map(|t| t.messages).sum()
+        self.topics.iter().fold(0, |sum, topic| sum.saturating_add(topic.messages))
     }
 
     /// Earliest and latest log time [ns]; `None` without messages.
@@ -243,7 +247,7 @@ impl Bag {
 }
 
 /// A channel and its schema as a topic, without messages yet.
-pub(crate) fn channel_topic(channel: &mcap::records::Channel, schema: &Schema) -> BagTopic {
+pub(crate) fn channel_topic(channel: &Channel, schema: &Schema) -> BagTopic {
     let qos = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
     BagTopic {
         topic: Topic {

@@ -109,20 +109,4 @@ impl Schema {
     pub fn parse(type_name: &str, text: &str) -> Result<Self> {
         parse::parse(type_name, text)
     }
-
-    /// Whether messages begin with a `builtin_interfaces/Time`, alone or in a `std_msgs/Header`.
-    pub fn begins_with_stamp(&self) -> bool {
-        let mut index = 0;
-        loop {
-            if self.structs[index].name == "builtin_interfaces/Time" {
-                return true;
-            }
-            match self.structs[index].fields.first() {
-                Some(Field { element: Element::Struct(inner), count: Count::One, .. }) => {
-                    index = *inner;
-                }
-                _ => return false,
-            }
-        }
-    }
 }

@@ -9,13 +9,12 @@ use std::{
     time::Duration,
 };
 
-use mcap::records::Metadata;
-
 use super::{BagOptions, BagSummary, Job, Losses, RECORDING, Shared, State};
 use crate::{
     error::{BagError, Result},
     file::{
         chunk::{Chunk, Compressor},
+        records::Metadata,
         writer::{Disk, FileSummary, FileWriter, TopicIds},
     },
     metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata},

@@ -11,12 +11,11 @@ use std::{
     time::Duration,
 };
 
-use mcap::records::{MessageHeader, Metadata};
-
 use crate::{
     error::{BagError, Result},
     file::{
         chunk::{Chunk, Compression, Compressor},
+        records::{MessageHeader, Metadata},
         writer::TopicIds,
     },
     reader::Message,
@@ -165,6 +164,7 @@ struct State {
     ring_bytes: usize,
     file_start: Option<u64>,
     carried: Losses,
+    written: u64,
     closing: bool,
     stopped: bool,
 }
@@ -349,6 +349,7 @@ impl BagWriter {
         let channel_id = topic.0;
         let header = MessageHeader { channel_id, sequence, log_time, publish_time };
         state.front.push(&header, parts);
+        state.written += 1;
         if state.front.data.len() < options.chunk_bytes {
             return Ok(());
         }
@@ -410,6 +411,17 @@ impl BagWriter {
         messages
     }
 
+    /// A count of the messages written, which other threads may watch.
+    pub fn counter(&self) -> Counter {
+        Counter { shared: Arc::clone(&self.shared) }
+    }
+
+    /// Messages counted as lost so far.
+    pub fn lost(&self) -> u64 {
+        let state = self.shared.lock();
+        state.carried.total() + state.topics.iter().map(|t| t.lost).sum::<u64>()
+    }
+
     /// Whether storing has failed, so that further messages are refused.
     pub fn has_stopped(&self) -> bool {
         self.shared.lock().stopped
@@ -435,6 +447,19 @@ impl BagWriter {
         self.shared.work.notify_one();
         // The thread has no code that panics; if it did, there would be no result to report.
         Some(thread.join().unwrap_or(Err(BagError::WriterStopped)))
+    }
+}
+
+/// Tells how many messages were handed to a [`BagWriter`].
+#[derive(Clone)]
+pub struct Counter {
+    shared: Arc<Shared>,
+}
+
+impl Counter {
+    /// Messages so far, those lost included.
+    pub fn messages(&self) -> u64 {
+        self.shared.lock().written
     }
 }
 

@@ -35,6 +35,7 @@
 mod background;
 mod cli;
 mod clock;
+mod discovered;
 mod endpoint;
 mod environment;
 mod error;
@@ -55,6 +56,7 @@ mod value;
 
 pub use cli::RosArgs;
 pub use clock::{SimClock, stamp};
+pub use discovered::RemoteWriter;
 pub use endpoint::{Cdr, Gid, HEADER_LENGTH, RawPublisher, RawSample, RawSubscription, SampleInfo};
 pub use environment::Environment;
 pub use error::RosError;

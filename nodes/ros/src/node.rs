@@ -13,6 +13,7 @@ use swath_msgs::{RosMessage, RosService};
 use crate::background::Background;
 use crate::cli::RosArgs;
 use crate::clock::SimClock;
+use crate::discovered::{RemoteWriter, remote_writers};
 use crate::endpoint::{Adapter, Cdr, Gid, RawPublisher, RawSubscription};
 use crate::environment::Environment;
 use crate::error::RosError;
@@ -292,6 +293,11 @@ impl Node {
     /// Fully qualified names of the nodes of the other processes in the domain.
     pub fn nodes(&self) -> BTreeSet<String> {
         self.roster.nodes()
+    }
+
+    /// The topic writers of the other processes in the domain.
+    pub fn remote_writers(&self) -> Vec<RemoteWriter> {
+        remote_writers(&self.dds.participant)
     }
 
     /// The parameters of this node.

@@ -1,0 +1,195 @@
+//! Measures writing, reading and recording; prints one JSON object.
+//!
+//! Recording takes two further processes: `bench_json record DIR` and `bench_json publish RATE N`.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
+
+use std::{
+    env,
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use serde_json::{Value, json};
+use swath_bags::{
+    Bag, BagOptions, BagWriter, Compression, Filter, Topic, TopicPattern,
+    qos::QosProfile,
+    record::{RecordOptions, Recorder},
+};
+use swath_msgs::Interface;
+use swath_ros::{
+    Cdr, Node, RosArgs, Shutdown,
+    qos::{Durability, History, QosProfile as RosProfile, WhenFull},
+};
+
+const TOPIC: &str = "/bench";
+const TYPE: &str = "std_msgs/msg/String";
+const MESSAGE_BYTES: usize = 300;
+const RECORDED: u64 = 1_000_000;
+const RATE: u64 = 50_000;
+/// A domain of its own, so that nothing else is recorded.
+const DOMAIN: &str = "39";
+
+fn main() {
+    let args: Vec<String> = env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let result = match args[..] {
+        [] => measure(),
+        ["record", dir] => record(Path::new(dir)),
+        ["publish", rate, n] => publish(rate.parse().unwrap(), n.parse().unwrap()),
+        _ => panic!("usage: bench_json [record DIR | publish RATE N]"),
+    };
+    println!("{result}");
+}
+
+/// A text of 300 bytes as CDR, of numbers that change as telemetry does.
+fn message(n: u64) -> Vec<u8> {
+    let numbers = (0..40).map(|i| format!("{:.6} ", ((n + i) as f64 / 97.0).sin()));
+    let mut text = numbers.collect::<String>();
+    text.truncate(MESSAGE_BYTES - 9);
+    let mut bytes = vec![0, 1, 0, 0];
+    bytes.extend((text.len() as u32 + 1).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes.push(0);
+    assert_eq!(bytes.len(), MESSAGE_BYTES);
+    bytes
+}
+
+fn measure() -> Value {
+    let temp = tempfile::tempdir().unwrap();
+    let messages: Vec<_> = (0..1024).map(message).collect();
+    let none = write(&temp.path().join("none"), Compression::None, &messages);
+    let zstd_dir = temp.path().join("zstd");
+    let zstd = write(&zstd_dir, Compression::Zstd, &messages);
+    let read = read(&zstd_dir);
+    let mut result = record_over_dds(&temp.path().join("recorded"));
+    result["bag_write_MB_per_s"] = json!(none.round());
+    result["bag_write_zstd_MB_per_s"] = json!(zstd.round());
+    result["bag_read_msgs_per_s"] = json!(read.round());
+    result
+}
+
+/// Writes a million messages; MB/s of message bytes, the end included.
+fn write(dir: &Path, compression: Compression, messages: &[Vec<u8>]) -> f64 {
+    let start = Instant::now();
+    let bag = BagWriter::create(dir, BagOptions { compression, ..BagOptions::default() }).unwrap();
+    let known = Interface::find(TYPE).unwrap();
+    let topic = Topic::new(TOPIC, TYPE, known.schema, known.type_hash, vec![QosProfile::reliable(1)]);
+    let topic = bag.add_topic(&topic.unwrap()).unwrap();
+    for n in 0..1_000_000u64 {
+        bag.write(topic, n, n, &messages[n as usize % messages.len()]).unwrap();
+    }
+    let summary = bag.close().unwrap();
+    summary.messages as f64 * MESSAGE_BYTES as f64 / 1e6 / start.elapsed().as_secs_f64()
+}
+
+/// Reads all messages in order of time; messages/s.
+fn read(dir: &Path) -> f64 {
+    let start = Instant::now();
+    let bag = Bag::open(dir).unwrap();
+    let mut messages = bag.messages(&Filter::default()).unwrap();
+    let mut n = 0.0;
+    while messages.next().unwrap().is_some() {
+        n += 1.0;
+    }
+    n / start.elapsed().as_secs_f64()
+}
+
+/// A publisher and a recorder, each in its process.
+fn record_over_dds(dir: &Path) -> Value {
+    let role = |args: &[&str]| {
+        let mut command = Command::new(env::current_exe().unwrap());
+        command.args(args).env("ROS_DOMAIN_ID", DOMAIN).stdout(Stdio::piped()).spawn().unwrap()
+    };
+    let recorder = role(&["record", dir.to_str().unwrap()]);
+    let publisher = role(&["publish", &RATE.to_string(), &RECORDED.to_string()]);
+    let sent: Value = last_line(publisher);
+    let recorded: Value = last_line(recorder);
+    let in_bag = recorded["messages"].as_u64().unwrap();
+    json!({
+        "record_msgs_per_s": (in_bag as f64 / sent["seconds"].as_f64().unwrap()).round(),
+        "record_lost": RECORDED.saturating_sub(in_bag),
+        "record_memory_MB": recorded["memory_MB"],
+        "record_cpu_s": recorded["cpu_s"],
+    })
+}
+
+fn last_line(child: std::process::Child) -> Value {
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "a part of the measurement failed");
+    let last = BufReader::new(&output.stdout[..]).lines().last().unwrap().unwrap();
+    serde_json::from_str(&last).unwrap()
+}
+
+/// Records until no message has come for two seconds.
+fn record(dir: &Path) -> Value {
+    let names = [TOPIC.to_owned()];
+    let options = RecordOptions {
+        output: dir.to_owned(),
+        topics: TopicPattern::new(&names, None, None).unwrap(),
+        discover: true,
+        depth: 16_384,
+        ..RecordOptions::default()
+    };
+    let recorder = Recorder::start(options, &RosArgs::default()).unwrap();
+    let shutdown = Shutdown::default();
+    let counter = recorder.counter();
+    let watched = shutdown.clone();
+    std::thread::spawn(move || {
+        let mut last = 0;
+        loop {
+            std::thread::sleep(Duration::from_secs(2));
+            let now = counter.messages();
+            if now > 0 && now == last {
+                return watched.ask();
+            }
+            last = now;
+        }
+    });
+    let summary = recorder.run(&shutdown, |_| ()).unwrap();
+    json!({ "messages": summary.messages, "lost": summary.lost, "memory_MB": memory_mb(), "cpu_s": cpu_s() })
+}
+
+/// Publishes N messages at a rate once the recorder is there.
+fn publish(rate: u64, n: u64) -> Value {
+    let (_, args) = RosArgs::split(["--ros-args", "-r", "__node:=bench_publisher"].map(str::to_owned)).unwrap();
+    let node = Node::start("operator", &args).unwrap();
+    let qos = RosProfile::publisher_default()
+        .reliability_reliable(WhenFull::Wait(Duration::from_secs(10)))
+        .durability(Durability::Volatile)
+        .history(History::KeepLast { depth: 4096 });
+    let publisher = node.raw_publisher(TOPIC, TYPE, &qos).unwrap();
+    while publisher.matched() == 0 {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    let messages: Vec<_> = (0..1024).map(|n| Cdr::from_bytes(message(n))).collect();
+    let start = Instant::now();
+    for n in 0..n {
+        if n % 50 == 0 {
+            let due = start + Duration::from_micros(n * 1_000_000 / rate);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+        publisher.publish(messages[n as usize % messages.len()].clone()).unwrap();
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    publisher.flush(Duration::from_secs(10));
+    std::thread::sleep(Duration::from_secs(1));
+    json!({ "seconds": seconds })
+}
+
+/// Largest resident set of this process [MB].
+fn memory_mb() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap() / 1000.0
+}
+
+/// Processor time of this process [s], from clock ticks of a hundredth of a second.
+fn cpu_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
+    let ticks = |n: usize| fields[n].parse::<f64>().unwrap();
+    (ticks(11) + ticks(12)) / 100.0
+}

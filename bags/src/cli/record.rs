@@ -1,0 +1,178 @@
+//! `record`: topics of a ROS 2 domain into a new bag.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use clap::Args;
+use serde_json::{Value, json};
+use swath_ros::{RosArgs, Shutdown};
+
+use super::{copy::Shape, print_json};
+use crate::{
+    date::file_name_date,
+    error::{BagError, Result},
+    reader::TopicPattern,
+    record::{RecordClock, RecordOptions, Recorder},
+    writer::BagOptions,
+};
+
+/// The metadata record that tells of the mission: configuration, seed, planner, policy, revision.
+pub const MANIFEST: &str = "swath_manifest";
+/// Its entry that holds the manifest as it was given.
+pub const MANIFEST_TEXT: &str = "manifest";
+
+/// Arguments of `record`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  swath-bag record -o out/bag --exclude '/rosout|/parameter_events' --max-bag-duration 5400
+
+Prints {\"event\":\"ready\",…} when every subscription exists, and {\"event\":\"closed\",…} at the end.
+Ctrl-C or SIGTERM closes the bag. Exits with 1 when messages were lost or could not be stored.
+Services: ~/pause, ~/resume, ~/toggle_paused, ~/is_paused, ~/split_bagfile, ~/snapshot, ~/stop.
+Words after --ros-args are those of every ROS 2 program.")]
+pub struct RecordArgs {
+    /// Topics to record; all without this and --regex
+    topics: Vec<String>,
+    /// Directory of the new bag; by default named after the time
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Topics to record, by a regular expression for the whole name
+    #[arg(short = 'e', long)]
+    regex: Option<String>,
+    /// Topics to leave out, by a regular expression for the whole name
+    #[arg(short = 'x', long)]
+    exclude: Option<String>,
+    /// Record only topics of Swath's node graph, do not look for others
+    #[arg(long)]
+    graph_only: bool,
+    /// Give messages the time of their coming instead of the simulated time that they carry
+    #[arg(long)]
+    wall_time: bool,
+    /// Messages that a subscription keeps while they wait to be stored
+    #[arg(long, default_value_t = 16_384, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    depth: u64,
+    /// Start paused
+    #[arg(long)]
+    start_paused: bool,
+    /// Keep messages in memory and store them when ~/snapshot is called
+    #[arg(long)]
+    snapshot_mode: bool,
+    /// Memory for messages in snapshot mode [bytes]
+    #[arg(long, default_value_t = 100 << 20, value_parser = clap::value_parser!(u64).range(1024..))]
+    max_cache_size: u64,
+    /// Pairs for metadata.yaml
+    #[arg(long, value_name = "KEY=VALUE", value_parser = pair)]
+    custom_data: Vec<(String, String)>,
+    /// TOML or JSON file that tells of the mission; its text and entries go into the bag as metadata
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+    /// Node whose topics must be matched before the recorder is ready; may be repeated
+    #[arg(long, value_name = "NODE")]
+    expect: Vec<String>,
+    #[command(flatten)]
+    shape: Shape,
+}
+
+impl RecordArgs {
+    pub(super) fn run(self, ros: &RosArgs) -> Result<ExitCode> {
+        let recorder = Recorder::start(self.options()?, ros)?;
+        let shutdown = Shutdown::on_signals(recorder.signal())?;
+        let summary = recorder.run(&shutdown, |topics| {
+            // The launcher waits for this line; without it, it gives up by itself.
+            if let Err(error) = print_json(&json!({ "event": "ready", "topics": topics })) {
+                tracing::warn!("{}", crate::error::chain(&error));
+            }
+        })?;
+        print_json(&json!({
+            "event": "closed", "messages": summary.messages, "lost": summary.lost,
+            "bytes": summary.bytes, "files": summary.files,
+        }))?;
+        if summary.lost > 0 {
+            eprintln!("{} messages were lost", summary.lost);
+            return Ok(ExitCode::FAILURE);
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn options(self) -> Result<RecordOptions> {
+        let metadata = match &self.manifest {
+            Some(path) => vec![(MANIFEST.to_owned(), manifest(path)?)],
+            None => Vec::new(),
+        };
+        let topics: Vec<String> = self.topics.iter().map(|t| format!("/{}", t.trim_start_matches('/'))).collect();
+        Ok(RecordOptions {
+            output: self.output.unwrap_or_else(default_output),
+            bag: BagOptions {
+                snapshot_bytes: self.snapshot_mode.then_some(self.max_cache_size as usize),
+                custom_data: self.custom_data.into_iter().collect(),
+                ..self.shape.options()
+            },
+            topics: TopicPattern::new(&topics, self.regex.as_deref(), self.exclude.as_deref())?,
+            discover: !self.graph_only,
+            clock: if self.wall_time { RecordClock::Wall } else { RecordClock::Simulated },
+            depth: self.depth as usize,
+            metadata,
+            paused: self.start_paused,
+            expected_nodes: self.expect,
+        })
+    }
+}
+
+fn default_output() -> PathBuf {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    format!("rosbag2_{}", file_name_date(now.as_secs())).into()
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or_else(|| format!("{text:?} is not KEY=VALUE"))?;
+    Ok((key.to_owned(), value.to_owned()))
+}
+
+/// What a manifest tells: the entries of a JSON object or TOML table, and the whole text.
+///
+/// Entries that are no text are stored as JSON.
+fn manifest(path: &Path) -> Result<BTreeMap<String, String>> {
+    let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
+    let refuse = |reason: String| BagError::Option {
+        option: "--manifest",
+        reason: format!("{}: {reason}", path.display()),
+    };
+    let table: BTreeMap<String, Value> = match path.extension().is_some_and(|e| e == "toml") {
+        true => toml::from_str(&text).map_err(|e| refuse(e.to_string()))?,
+        false => serde_json::from_str(&text).map_err(|e| refuse(e.to_string()))?,
+    };
+    let in_words = |value: Value| match value {
+        Value::String(text) => text,
+        other => other.to_string(),
+    };
+    let mut pairs: BTreeMap<String, String> = table.into_iter().map(|(key, value)| (key, in_words(value))).collect();
+    pairs.insert(MANIFEST_TEXT.to_owned(), text);
+    Ok(pairs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn manifests_are_toml_or_json() {
+        let temp = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = temp.path().join(name);
+            fs::write(&path, text).unwrap();
+            manifest(&path)
+        };
+        let toml = write("mission.toml", "planner = \"fixed\"\nseed = 7\n[orbit]\naltitude = 5e5\n").unwrap();
+        assert_eq!(toml["planner"], "fixed");
+        assert_eq!(toml["seed"], "7");
+        assert_eq!(toml["orbit"], "{\"altitude\":500000.0}");
+        assert!(toml[MANIFEST_TEXT].starts_with("planner = "));
+        assert_eq!(write("facts.json", "{\"seed\":7}").unwrap()["seed"], "7");
+        assert!(write("mission.toml", "planner").unwrap_err().to_string().starts_with("--manifest: "));
+    }
+}
