@@ -53,6 +53,9 @@ pub struct RecordArgs {
     /// Give messages the time of their coming instead of the simulated time that they carry
     #[arg(long)]
     wall_time: bool,
+    /// Simulated time will be published: hold messages without a stamp until the first /clock
+    #[arg(long, conflicts_with = "wall_time")]
+    use_sim_time: bool,
     /// Messages that a subscription keeps while they wait to be stored
     #[arg(long, default_value_t = 16_384, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     depth: u64,
@@ -114,7 +117,11 @@ impl RecordArgs {
             },
             topics: TopicPattern::new(&topics, self.regex.as_deref(), self.exclude.as_deref())?,
             discover: !self.graph_only,
-            clock: if self.wall_time { RecordClock::Wall } else { RecordClock::Simulated },
+            clock: match (self.wall_time, self.use_sim_time) {
+                (true, _) => RecordClock::Wall,
+                (false, true) => RecordClock::SimulatedLater,
+                (false, false) => RecordClock::Simulated,
+            },
             depth: self.depth as usize,
             metadata,
             paused: self.start_paused,
@@ -138,10 +145,8 @@ fn pair(text: &str) -> Result<(String, String), String> {
 /// Entries that are no text are stored as JSON.
 fn manifest(path: &Path) -> Result<BTreeMap<String, String>> {
     let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
-    let refuse = |reason: String| BagError::Option {
-        option: "--manifest",
-        reason: format!("{}: {reason}", path.display()),
-    };
+    let refuse =
+        |reason: String| BagError::Option { option: "--manifest", reason: format!("{}: {reason}", path.display()) };
     let table: BTreeMap<String, Value> = match path.extension().is_some_and(|e| e == "toml") {
         true => toml::from_str(&text).map_err(|e| refuse(e.to_string()))?,
         false => serde_json::from_str(&text).map_err(|e| refuse(e.to_string()))?,

@@ -30,6 +30,8 @@ const BATCH: Duration = Duration::from_millis(4);
 const CHORES: Duration = Duration::from_millis(250);
 /// How long after a match the other side may still not send [wall time].
 const SETTLING: Duration = Duration::from_millis(300);
+/// Messages that are held because their time is not known yet; more are given the time of their coming.
+const HELD: usize = 10_000;
 /// How long after the end is asked for messages on their way are waited for [wall time].
 const LAST_MESSAGES: Duration = Duration::from_millis(200);
 
@@ -40,6 +42,9 @@ pub enum RecordClock {
     /// where nobody publishes that, the time of its coming.
     #[default]
     Simulated,
+    /// As [`RecordClock::Simulated`], and somebody will publish `/clock`: messages without a stamp
+    /// that come before the first one are held until then.
+    SimulatedLater,
     /// When the message came in.
     Wall,
 }
@@ -77,12 +82,12 @@ pub struct Recorder {
     options: RecordOptions,
     /// Latest simulated time known [ns].
     now: Option<u64>,
-    /// Whether somebody publishes simulated time.
-    has_clock: bool,
     paused: bool,
     /// Topics that were seen and are not recorded.
     passed_over: BTreeSet<String>,
     batch: Vec<Taken>,
+    /// Messages without a stamp that came before the first `/clock`.
+    early: Vec<Taken>,
     chores_at: Instant,
     matched_at: Option<Instant>,
 }
@@ -105,10 +110,10 @@ impl Recorder {
             node,
             writer,
             now: None,
-            has_clock: false,
             paused: options.paused,
             passed_over: BTreeSet::new(),
             batch: Vec::new(),
+            early: Vec::new(),
             chores_at: Instant::now(),
             matched_at: None,
             options,
@@ -165,34 +170,53 @@ impl Recorder {
         batch.sort_by_key(|taken| taken.received_ns());
         let taken = batch.len();
         for message in batch.drain(..) {
-            self.store(&message);
+            self.store(message);
         }
         self.batch = batch;
         Ok(taken)
     }
 
-    fn store(&mut self, message: &Taken) {
+    /// Stores a message, or holds it until its time is known.
+    fn store(&mut self, message: Taken) {
         let source = &self.sources[message.source];
-        let cdr = message.sample.cdr.as_bytes();
-        let info = &message.sample.info;
-        if let Some(stamp) = source.stamp_of(cdr) {
+        let stamp = source.stamp_of(message.sample.cdr.as_bytes());
+        let first_clock = stamp.is_some() && self.now.is_none();
+        if let Some(stamp) = stamp {
             self.now = if source.is_clock { Some(stamp) } else { self.now.max(Some(stamp)) };
+        }
+        if first_clock {
+            self.store_early();
         }
         if self.paused {
             return;
         }
-        let received = info.received_time_ns;
-        let (log_time, publish_time) = match self.options.clock {
-            RecordClock::Simulated => {
-                let unstamped = || self.now.unwrap_or(if self.has_clock { 0 } else { received });
-                let time = source.stamp_of(cdr).unwrap_or_else(unstamped);
-                (time, time)
+        let received = message.received_ns();
+        if self.options.clock == RecordClock::Wall {
+            let published = message.sample.info.source_time_ns.unwrap_or(received);
+            self.write(&message, received, published);
+        } else if let Some(time) = stamp.or(self.now) {
+            self.write(&message, time, time);
+        } else {
+            self.early.push(message);
+            if self.early.len() >= HELD {
+                self.store_early();
             }
-            RecordClock::Wall => (received, info.source_time_ns.unwrap_or(received)),
-        };
-        if self.writer.write(source.topic, log_time, publish_time, cdr).is_err() {
+        }
+    }
+
+    /// Stores the messages that were held, at the time known now or else the time of their coming.
+    fn store_early(&mut self) {
+        for message in std::mem::take(&mut self.early) {
+            let time = self.now.unwrap_or_else(|| message.received_ns());
+            self.write(&message, time, time);
+        }
+    }
+
+    fn write(&mut self, message: &Taken, log_time: u64, publish_time: u64) {
+        let topic = self.sources[message.source].topic;
+        if self.writer.write(topic, log_time, publish_time, message.sample.cdr.as_bytes()).is_err() {
             // The writer has stopped: this one message is lost beyond those that it counts itself.
-            self.writer.count_lost(source.topic, 1);
+            self.writer.count_lost(topic, 1);
         }
     }
 
@@ -208,7 +232,10 @@ impl Recorder {
     /// Losses, services, diagnostics, new topics; returns whether the end was asked for.
     fn do_chores(&mut self) -> Result<bool> {
         self.chores_at = Instant::now();
-        self.has_clock = self.sources.iter().any(|source| source.is_clock && source.is_matched_at_all());
+        let has_clock = || self.sources.iter().any(|source| source.is_clock && source.is_matched_at_all());
+        if self.options.clock == RecordClock::Simulated && !self.early.is_empty() && !has_clock() {
+            self.store_early();
+        }
         self.node.clock().set_ns(self.now.unwrap_or(0));
         self.count_losses();
         let wishes = self.control.wishes(self.paused)?;
@@ -248,6 +275,7 @@ impl Recorder {
             self.take_all()?;
             std::thread::sleep(BATCH);
         }
+        self.store_early();
         self.count_losses();
         Ok(())
     }

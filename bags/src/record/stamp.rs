@@ -29,7 +29,7 @@ impl StampPlace {
         }
     }
 
-    /// Reads the time [ns] from CDR bytes, encapsulation header included.
+    /// Reads the time [ns] from CDR bytes, encapsulation header included; a stamp of 0 is one that was not set.
     pub(crate) fn read(self, cdr: &[u8]) -> Option<u64> {
         let little = cdr.get(1)? & 1 == 1;
         let word = |at: usize| {
@@ -43,7 +43,7 @@ impl StampPlace {
         };
         // Seconds are signed; a time before zero has no place in a bag.
         let seconds = u64::try_from(word(at)?.cast_signed()).ok()?;
-        Some(seconds * 1_000_000_000 + u64::from(word(at + 4)?))
+        Some(seconds * 1_000_000_000 + u64::from(word(at + 4)?)).filter(|stamp| *stamp > 0)
     }
 }
 

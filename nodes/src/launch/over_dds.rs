@@ -32,7 +32,7 @@ pub fn fly(mission: &Mission, mission_file: &Path, output: &mut OutputFolder, re
     let mut fleet = Fleet::default();
     if record {
         let bag = output.path().join("bag");
-        let words = ["record", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
+        let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
         fleet.start(graph::RECORDER, "swath-bag", &words.map(str::to_owned), true)?;
         fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
     }
