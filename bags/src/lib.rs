@@ -9,6 +9,7 @@ mod error;
 mod file;
 pub mod metadata;
 pub mod ops;
+pub mod play;
 pub mod qos;
 mod reader;
 pub mod record;

@@ -130,6 +130,49 @@ impl QosProfile {
     }
 }
 
+/// What differs from a profile, in the words of rosbag2's override files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct QosOverride {
+    /// History policy.
+    pub history: Option<History>,
+    /// Samples kept.
+    pub depth: Option<u64>,
+    /// Reliability policy.
+    pub reliability: Option<Reliability>,
+    /// Durability policy.
+    pub durability: Option<Durability>,
+    /// Longest time between samples.
+    pub deadline: Option<QosDuration>,
+    /// How long a sample stays valid.
+    pub lifespan: Option<QosDuration>,
+    /// Liveliness policy.
+    pub liveliness: Option<Liveliness>,
+    /// How long a writer counts as alive.
+    pub liveliness_lease_duration: Option<QosDuration>,
+    /// Whether the topic's name goes to DDS without ROS's prefix.
+    pub avoid_ros_namespace_conventions: Option<bool>,
+}
+
+impl QosOverride {
+    /// The profile with what is set here.
+    pub fn apply(&self, to: QosProfile) -> QosProfile {
+        QosProfile {
+            history: self.history.unwrap_or(to.history),
+            depth: self.depth.unwrap_or(to.depth),
+            reliability: self.reliability.unwrap_or(to.reliability),
+            durability: self.durability.unwrap_or(to.durability),
+            deadline: self.deadline.unwrap_or(to.deadline),
+            lifespan: self.lifespan.unwrap_or(to.lifespan),
+            liveliness: self.liveliness.unwrap_or(to.liveliness),
+            liveliness_lease_duration: self.liveliness_lease_duration.unwrap_or(to.liveliness_lease_duration),
+            avoid_ros_namespace_conventions: self
+                .avoid_ros_namespace_conventions
+                .unwrap_or(to.avoid_ros_namespace_conventions),
+        }
+    }
+}
+
 /// The YAML list of a channel's `offered_qos_profiles`; empty for no profile.
 pub fn to_yaml(profiles: &[QosProfile]) -> Result<String> {
     if profiles.is_empty() {
@@ -175,6 +218,14 @@ mod tests {
 ";
         assert_eq!(text, expected);
         assert_eq!(from_yaml(&text).unwrap(), [QosProfile::latched(1)]);
+    }
+
+    #[test]
+    fn an_override_changes_what_it_names() {
+        let change: QosOverride = serde_yaml_ng::from_str("reliability: best_effort\ndepth: 3\n").unwrap();
+        let expected = QosProfile { reliability: Reliability::BestEffort, depth: 3, ..QosProfile::latched(1) };
+        assert_eq!(change.apply(QosProfile::latched(1)), expected);
+        assert!(serde_yaml_ng::from_str::<QosOverride>("reliabilty: best_effort").is_err());
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod copy;
 mod inspect;
+mod play;
 mod record;
 
 use std::{
@@ -20,6 +21,8 @@ use crate::error::{BagError, Result};
 pub enum Command {
     /// Record topics into a new bag
     Record(record::RecordArgs),
+    /// Publish a bag's messages
+    Play(play::PlayArgs),
     /// Tell what is in a bag: topics, times, counts, and the mission's facts
     Info(inspect::InfoArgs),
     /// Print messages as JSON lines
@@ -45,6 +48,7 @@ impl Command {
     pub fn run(self, ros: &RosArgs) -> Result<ExitCode> {
         let result = match self {
             Self::Record(args) => args.run(ros),
+            Self::Play(args) => args.run(ros),
             Self::Info(args) => args.run(),
             Self::Cat(args) => args.run(),
             Self::Validate(args) => args.run(),

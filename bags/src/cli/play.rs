@@ -1,0 +1,149 @@
+//! `play`: a bag's messages onto a ROS 2 domain.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::Duration,
+};
+
+use clap::Args;
+use serde_json::json;
+use swath_ros::{RosArgs, Shutdown};
+
+use super::{copy::seconds, print_json};
+use crate::{
+    error::{BagError, Result, chain},
+    play::{PlayOptions, Player},
+    qos::QosOverride,
+    reader::TopicPattern,
+};
+
+/// Arguments of `play`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  swath-bag play out/bag --rate 10 --start-offset 600 --topics /swath/spacecraft/state /tf --clock
+
+Keys: space pauses and resumes, right plays the next message while paused, up and down change the rate.
+Services: ~/pause, ~/resume, ~/toggle_paused, ~/is_paused, ~/get_rate, ~/set_rate, ~/play_next, ~/burst,
+~/seek, ~/stop. Words after --ros-args are those of every ROS 2 program.
+Prints {\"event\":\"ready\",…} when every publisher exists, and {\"event\":\"done\",…} at the end.")]
+pub struct PlayArgs {
+    /// Bag directories or .mcap files, played as one bag
+    #[arg(required = true)]
+    bags: Vec<PathBuf>,
+    /// Speed: log time over wall time; 0 is as fast as it goes
+    #[arg(short, long, default_value_t = 1.0, value_parser = rate)]
+    rate: f64,
+    /// Start anew at the end
+    #[arg(short, long = "loop")]
+    repeat: bool,
+    /// Start so long after the bag's start [s]
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
+    start_offset: u64,
+    /// Play so much log time [s]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    playback_duration: Option<u64>,
+    /// Play until so long after the bag's start [s]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "playback_duration")]
+    until: Option<u64>,
+    /// Wait before the first message, so that readers are found [s]
+    #[arg(short, long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
+    delay: u64,
+    /// Start paused
+    #[arg(short = 'p', long)]
+    start_paused: bool,
+    /// Publish /clock, so often a second; the bag's own /clock is left out then
+    #[arg(long, value_name = "HZ", num_args = 0..=1, default_missing_value = "40", value_parser = frequency)]
+    clock: Option<f64>,
+    /// Topics to play; all without this and --regex
+    #[arg(long, value_name = "TOPIC", num_args = 1..)]
+    topics: Vec<String>,
+    /// Topics to play, by a regular expression for the whole name
+    #[arg(short = 'e', long)]
+    regex: Option<String>,
+    /// Topics to leave out, by a regular expression for the whole name
+    #[arg(short = 'x', long)]
+    exclude: Option<String>,
+    /// Play a topic under another name
+    #[arg(short = 'm', long, value_name = "OLD:=NEW", num_args = 1.., value_parser = renaming)]
+    remap: Vec<(String, String)>,
+    /// YAML file: by topic, what differs from the recorded QoS
+    #[arg(long, value_name = "FILE")]
+    qos_profile_overrides_path: Option<PathBuf>,
+    /// Leave the terminal's keys alone
+    #[arg(long)]
+    disable_keyboard_controls: bool,
+}
+
+impl PlayArgs {
+    pub(super) fn run(self, ros: &RosArgs) -> Result<ExitCode> {
+        let player = Player::start(self.options()?, ros)?;
+        let shutdown = Shutdown::on_signals(player.signal())?;
+        let summary = player.run(&shutdown, |topics| {
+            if let Err(error) = print_json(&json!({ "event": "ready", "topics": topics })) {
+                tracing::warn!("{}", chain(&error));
+            }
+        })?;
+        print_json(&json!({
+            "event": "done",
+            "messages": summary.published,
+            "refused": summary.refused,
+            "wall_seconds": summary.wall.as_secs_f64(),
+            "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3,
+        }))?;
+        Ok(if summary.refused == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    }
+
+    fn options(self) -> Result<PlayOptions> {
+        let qos_overrides = match &self.qos_profile_overrides_path {
+            Some(path) => overrides(path)?,
+            None => BTreeMap::new(),
+        };
+        let duration_end = self.playback_duration.map(|d| self.start_offset.saturating_add(d));
+        Ok(PlayOptions {
+            bags: self.bags,
+            topics: TopicPattern::new(&self.topics, self.regex.as_deref(), self.exclude.as_deref())?,
+            rate: self.rate,
+            repeat: self.repeat,
+            start_offset: self.start_offset,
+            end_offset: self.until.or(duration_end),
+            delay: Duration::from_nanos(self.delay),
+            paused: self.start_paused,
+            clock_hz: self.clock,
+            remap: self.remap.into_iter().collect(),
+            qos_overrides,
+            keys: !self.disable_keyboard_controls,
+        })
+    }
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    in_range(text, 0.0, 1e6)
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    in_range(text, 0.001, 10_000.0)
+}
+
+fn in_range(text: &str, least: f64, greatest: f64) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("{text:?} is no number"))?;
+    match (least..=greatest).contains(&value) {
+        true => Ok(value),
+        false => Err(format!("{value} is outside {least} to {greatest}")),
+    }
+}
+
+fn renaming(text: &str) -> Result<(String, String), String> {
+    let (old, new) = text.split_once(":=").ok_or_else(|| format!("{text:?} is not OLD:=NEW"))?;
+    Ok((old.to_owned(), new.to_owned()))
+}
+
+fn overrides(path: &Path) -> Result<BTreeMap<String, QosOverride>> {
+    let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
+    serde_yaml_ng::from_str(&text).map_err(|e| BagError::Option {
+        option: "--qos-profile-overrides-path",
+        reason: format!("{}: {e}", path.display()),
+    })
+}

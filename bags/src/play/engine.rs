@@ -1,0 +1,197 @@
+//! What plays: the next message, its publisher, and when it is due.
+
+use std::time::{Duration, Instant};
+
+use swath_msgs::{builtin_interfaces::Time, rosgraph_msgs::Clock};
+use swath_ros::{Cdr, Publisher, RawPublisher, stamp};
+
+use super::{lateness::Lateness, pace::Pace};
+use crate::{
+    error::{Result, chain},
+    reader::{Bag, Filter, Messages},
+};
+
+/// A message that is next.
+struct Pending {
+    topic: usize,
+    log_time: u64,
+    cdr: Cdr,
+}
+
+/// Publishes simulated time while it plays.
+pub(super) struct ClockPublisher {
+    pub publisher: Publisher<Clock>,
+    /// Log time between two messages at rate 1 [ns].
+    pub period_ns: u64,
+    /// Log time of the last message.
+    pub last: Option<u64>,
+}
+
+/// A bag being played.
+pub(super) struct Engine<'a> {
+    bag: &'a Bag,
+    filter: Filter,
+    messages: Messages<'a>,
+    pending: Option<Pending>,
+    /// By topic of the bag.
+    publishers: Vec<Option<RawPublisher>>,
+    clock: Option<ClockPublisher>,
+    pub pace: Pace,
+    pub published: u64,
+    pub refused: u64,
+    pub lateness: Lateness,
+}
+
+impl<'a> Engine<'a> {
+    /// Reads the first message; nothing is published yet.
+    pub(super) fn new(
+        bag: &'a Bag,
+        filter: Filter,
+        publishers: Vec<Option<RawPublisher>>,
+        clock: Option<ClockPublisher>,
+        pace: Pace,
+    ) -> Result<Self> {
+        let messages = bag.messages(&filter)?;
+        let mut engine = Self {
+            bag,
+            filter,
+            messages,
+            pending: None,
+            publishers,
+            clock,
+            pace,
+            published: 0,
+            refused: 0,
+            lateness: Lateness::default(),
+        };
+        engine.load()?;
+        Ok(engine)
+    }
+
+    fn load(&mut self) -> Result<()> {
+        let message = self.messages.next()?;
+        self.pending =
+            message.map(|m| Pending { topic: m.topic, log_time: m.log_time, cdr: Cdr::from_bytes(m.data.to_vec()) });
+        Ok(())
+    }
+
+    /// Publishes what latched topics held before the first message.
+    pub(super) fn publish_latched(&mut self, held: Vec<(usize, Vec<u8>)>) {
+        for (topic, data) in held {
+            self.publish(topic, Cdr::from_bytes(data));
+        }
+    }
+
+    /// Whether nothing is left to play.
+    pub(super) fn is_over(&self) -> bool {
+        self.pending.is_none()
+    }
+
+    /// How long until the next message or clock is due; `None` while paused or at the end.
+    pub(super) fn wait(&self, now: Instant) -> Option<Duration> {
+        let next = self.pending.as_ref()?.log_time;
+        let next = self.next_clock().map_or(next, |clock| clock.min(next));
+        self.pace.wait(next, now)
+    }
+
+    /// Publishes clock and message if they are due.
+    pub(super) fn play_due(&mut self, now: Instant) -> Result<()> {
+        if let Some(time) = self.next_clock().filter(|time| self.pace.wait(*time, now) == Some(Duration::ZERO)) {
+            // At rate 0 the clock is that of the message that comes.
+            let next = self.pending.as_ref().map_or(time, |pending| pending.log_time);
+            let time = if self.pace.rate() == 0.0 { next } else { self.pace.log_time(now).min(next) };
+            self.publish_clock(time)?;
+        }
+        let Some(pending) = &self.pending else { return Ok(()) };
+        if self.pace.wait(pending.log_time, now) != Some(Duration::ZERO) {
+            return Ok(());
+        }
+        if self.pace.rate() > 0.0 {
+            let late = self.pace.log_time(now).saturating_sub(pending.log_time) as f64 / self.pace.rate();
+            self.lateness.note(Duration::from_nanos(late as u64));
+        }
+        self.play_next().map(|_| ())
+    }
+
+    /// Publishes the next message, due or not; `false` at the end.
+    pub(super) fn play_next(&mut self) -> Result<bool> {
+        let Some(pending) = self.pending.take() else { return Ok(false) };
+        self.publish(pending.topic, pending.cdr);
+        self.load()?;
+        Ok(true)
+    }
+
+    fn publish(&mut self, topic: usize, cdr: Cdr) {
+        let Some(publisher) = &self.publishers[topic] else { return };
+        match publisher.publish(cdr) {
+            Ok(()) => self.published += 1,
+            Err(error) => {
+                // One warning is enough; the count is in the summary.
+                if self.refused == 0 {
+                    tracing::warn!("{}", chain(&error));
+                }
+                self.refused += 1;
+            }
+        }
+    }
+
+    /// Publishes one message while paused; time moves to it.
+    pub(super) fn step(&mut self) -> Result<bool> {
+        let Some(time) = self.pending.as_ref().map(|pending| pending.log_time) else { return Ok(false) };
+        self.pace.move_to(time, Instant::now());
+        if self.clock.is_some() {
+            self.publish_clock(time)?;
+        }
+        self.play_next()
+    }
+
+    /// Goes on with the messages from a log time on [ns]; `false` if the bag does not reach there.
+    pub(super) fn seek(&mut self, log_time: u64) -> Result<bool> {
+        let inside = |(start, end): (u64, u64)| (start..=end).contains(&log_time);
+        if !self.bag.time_range().is_some_and(inside) || log_time > self.filter.until {
+            return Ok(false);
+        }
+        self.messages = self.bag.messages(&Filter { from: log_time, ..self.filter.clone() })?;
+        self.pace.move_to(log_time, Instant::now());
+        if let Some(clock) = &mut self.clock {
+            clock.last = None;
+        }
+        self.load()?;
+        Ok(true)
+    }
+
+    /// Starts anew from a log time [ns].
+    pub(super) fn rewind(&mut self, log_time: u64) -> Result<()> {
+        self.messages = self.bag.messages(&self.filter)?;
+        self.pace.move_to(log_time, Instant::now());
+        if let Some(clock) = &mut self.clock {
+            clock.last = None;
+        }
+        self.load()
+    }
+
+    /// Waits until reliable readers have everything.
+    pub(super) fn flush(&self, timeout: Duration) {
+        let deadline = Instant::now() + timeout;
+        for publisher in self.publishers.iter().flatten() {
+            publisher.flush(deadline.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    /// The log time at which the next clock message is due [ns].
+    fn next_clock(&self) -> Option<u64> {
+        let clock = self.clock.as_ref()?;
+        // The frequency is one of wall time: a higher rate makes longer steps of log time.
+        let rate = if self.pace.rate() == 0.0 { 1.0 } else { self.pace.rate() };
+        Some(clock.last.map_or(0, |last| last.saturating_add((clock.period_ns as f64 * rate) as u64)))
+    }
+
+    fn publish_clock(&mut self, log_time: u64) -> Result<()> {
+        if let Some(clock) = &mut self.clock {
+            clock.last = Some(log_time);
+            let time: Time = stamp(log_time);
+            clock.publisher.publish(&Clock { clock: time })?;
+        }
+        Ok(())
+    }
+}

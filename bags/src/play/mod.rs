@@ -1,0 +1,263 @@
+//! Plays bags: publishes recorded messages at the pace of their log times.
+
+mod control;
+mod engine;
+mod keys;
+mod lateness;
+mod pace;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use swath_ros::{Node, RosArgs, Shutdown, graph};
+
+use self::{
+    control::{Control, follow_key},
+    engine::{ClockPublisher, Engine},
+    keys::Keys,
+    pace::Pace,
+};
+use crate::{
+    error::{BagError, Result, chain},
+    qos::{Durability, QosOverride, QosProfile},
+    reader::{Bag, BagTopic, Filter, TopicPattern},
+    record::qos::to_ros,
+};
+
+/// The topic of simulated time.
+const CLOCK: &str = "/clock";
+/// Longest time without looking after services and keys [wall time].
+const CHORES: Duration = Duration::from_millis(20);
+/// Messages that are played at a time when nothing has to be waited for.
+const TURN: usize = 256;
+/// How long readers may take to acknowledge the last messages [wall time].
+const LAST_MESSAGES: Duration = Duration::from_secs(5);
+
+/// What is played, and how.
+#[derive(Debug, Clone)]
+pub struct PlayOptions {
+    /// Bags, which are played as one.
+    pub bags: Vec<PathBuf>,
+    /// Which topics.
+    pub topics: TopicPattern,
+    /// Log time over wall time; 0 is as fast as it goes.
+    pub rate: f64,
+    /// Whether playing starts anew at the end.
+    pub repeat: bool,
+    /// Log time after the bag's start at which playing starts [ns].
+    pub start_offset: u64,
+    /// Log time after the bag's start at which playing ends [ns].
+    pub end_offset: Option<u64>,
+    /// Wait before the first message, so that readers are found [wall time].
+    pub delay: Duration,
+    /// Whether playing starts paused.
+    pub paused: bool,
+    /// Publish simulated time so often [1/s of wall time]; the bag's own is left out then.
+    pub clock_hz: Option<f64>,
+    /// Other names for topics.
+    pub remap: BTreeMap<String, String>,
+    /// By topic: what differs from the recorded QoS.
+    pub qos_overrides: BTreeMap<String, QosOverride>,
+    /// Whether keys control the player.
+    pub keys: bool,
+}
+
+/// How playing went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaySummary {
+    /// Messages published.
+    pub published: u64,
+    /// Messages that could not be published.
+    pub refused: u64,
+    /// Wall time from the first message to the last.
+    pub wall: Duration,
+    /// Lateness that 99 % of the messages do not exceed.
+    pub late_p99: Duration,
+}
+
+/// A player with its node.
+pub struct Player {
+    node: Node,
+    options: PlayOptions,
+}
+
+impl Player {
+    /// Starts the node.
+    ///
+    /// # Errors
+    /// [`BagError::Ros`] when the node cannot be started.
+    pub fn start(options: PlayOptions, args: &RosArgs) -> Result<Self> {
+        let node = Node::start(graph::PLAYER, args)?;
+        Ok(Self { node, options })
+    }
+
+    /// The node's signal, for [`Shutdown::on_signals`].
+    pub fn signal(&self) -> &swath_ros::Signal {
+        self.node.signal()
+    }
+
+    /// Plays until the end, or until it is asked for; `ready` is called when all publishers exist.
+    ///
+    /// # Errors
+    /// Whatever keeps a bag from being read or a publisher from being made.
+    pub fn run(self, shutdown: &Shutdown, ready: impl FnOnce(usize)) -> Result<PlaySummary> {
+        let bag = Bag::open_all(&self.options.bags)?;
+        let (from, filter) = self.span(&bag)?;
+        let publishers = self.publishers(&bag)?;
+        let count = publishers.iter().flatten().count();
+        let clock = self.clock()?;
+        let control = Control::new(&self.node)?;
+        let keys = if self.options.keys { Keys::listen() } else { None };
+        let latched = latched_before(&bag, &filter)?;
+        let pace = Pace::new(self.options.rate, from, Instant::now(), self.options.paused);
+        let mut engine = Engine::new(&bag, filter, publishers, clock, pace)?;
+        ready(count);
+        self.pause_before_start(shutdown)?;
+        engine.publish_latched(latched);
+        engine.pace.move_to(from, Instant::now());
+        let start = Instant::now();
+        self.play(&mut engine, &control, keys.as_ref(), from, shutdown)?;
+        let wall = start.elapsed();
+        engine.flush(LAST_MESSAGES);
+        Ok(PlaySummary {
+            published: engine.published,
+            refused: engine.refused,
+            wall,
+            late_p99: engine.lateness.quantile(0.99),
+        })
+    }
+
+    fn play(
+        &self,
+        engine: &mut Engine<'_>,
+        control: &Control,
+        keys: Option<&Keys>,
+        from: u64,
+        shutdown: &Shutdown,
+    ) -> Result<()> {
+        let mut chores_at = Instant::now();
+        while !shutdown.asked() {
+            if chores_at.elapsed() >= CHORES {
+                chores_at = Instant::now();
+                if control.serve(engine)? {
+                    return Ok(());
+                }
+                while let Some(key) = keys.and_then(Keys::next) {
+                    follow_key(key, engine)?;
+                }
+            }
+            if engine.is_over() {
+                if !self.options.repeat {
+                    return Ok(());
+                }
+                engine.rewind(from)?;
+            }
+            match engine.wait(Instant::now()) {
+                Some(Duration::ZERO) => {
+                    for _ in 0..TURN {
+                        engine.play_due(Instant::now())?;
+                    }
+                }
+                // The signal ends the wait early when a service is called.
+                Some(due) => {
+                    self.node.wait(due.min(CHORES))?;
+                }
+                None => {
+                    self.node.wait(CHORES)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits the delay out, or until the end is asked for.
+    fn pause_before_start(&self, shutdown: &Shutdown) -> Result<()> {
+        let start = Instant::now();
+        while start.elapsed() < self.options.delay && !shutdown.asked() {
+            let left = self.options.delay.saturating_sub(start.elapsed());
+            self.node.wait(left.min(CHORES))?;
+        }
+        Ok(())
+    }
+
+    /// The first log time and the messages to play.
+    fn span(&self, bag: &Bag) -> Result<(u64, Filter)> {
+        let (start, end) = bag.time_range().unwrap_or((0, 0));
+        let from = start.saturating_add(self.options.start_offset);
+        if from > end {
+            let reason = format!("{} ns is past the bag's end at {} ns", self.options.start_offset, end - start);
+            return Err(BagError::Option { option: "--start-offset", reason });
+        }
+        let until = self.options.end_offset.map_or(u64::MAX, |offset| start.saturating_add(offset));
+        Ok((from, Filter { topics: self.options.topics.clone(), from, until }))
+    }
+
+    /// A publisher for each topic that is played.
+    fn publishers(&self, bag: &Bag) -> Result<Vec<Option<swath_ros::RawPublisher>>> {
+        let known: BTreeSet<&str> = bag.topics().iter().map(|t| t.topic.name.as_str()).collect();
+        if let Some(unknown) = self.options.qos_overrides.keys().find(|name| !known.contains(name.as_str())) {
+            let reason = format!("the bag has no topic {unknown}");
+            return Err(BagError::Option { option: "--qos-profile-overrides-path", reason });
+        }
+        bag.topics().iter().map(|topic| self.publisher(topic)).collect()
+    }
+
+    fn publisher(&self, topic: &BagTopic) -> Result<Option<swath_ros::RawPublisher>> {
+        let name = &topic.topic.name;
+        let own_clock = self.options.clock_hz.is_some() && name == CLOCK;
+        if !self.options.topics.selects(name) || own_clock {
+            return Ok(None);
+        }
+        if topic.topic.message_encoding != "cdr" {
+            tracing::warn!("{name} is not played: its encoding {:?} is not cdr", topic.topic.message_encoding);
+            return Ok(None);
+        }
+        let mut qos = topic.topic.qos.first().copied().unwrap_or(QosProfile::reliable(10));
+        if let Some(change) = self.options.qos_overrides.get(name) {
+            qos = change.apply(qos);
+        }
+        let renamed = self.options.remap.get(name).unwrap_or(name);
+        match self.node.raw_publisher(renamed, &topic.topic.type_name, &to_ros(&qos)) {
+            Ok(publisher) => Ok(Some(publisher)),
+            Err(error) => {
+                tracing::warn!("{name} is not played: {}", chain(&error));
+                Ok(None)
+            }
+        }
+    }
+
+    fn clock(&self) -> Result<Option<ClockPublisher>> {
+        let Some(hz) = self.options.clock_hz else { return Ok(None) };
+        let publisher = self.node.publisher(&graph::CLOCK)?;
+        Ok(Some(ClockPublisher { publisher, period_ns: (1e9 / hz) as u64, last: None }))
+    }
+}
+
+/// What latched topics held before the span that is played: topic and bytes, in order of time.
+fn latched_before(bag: &Bag, filter: &Filter) -> Result<Vec<(usize, Vec<u8>)>> {
+    let depth = |topic: &BagTopic| match topic.topic.qos.first() {
+        Some(qos) if qos.durability == Durability::TransientLocal => qos.depth.max(1) as usize,
+        _ => 0,
+    };
+    let selected = |t: &&BagTopic| depth(t) > 0 && filter.topics.selects(&t.topic.name);
+    let names: Vec<String> = bag.topics().iter().filter(selected).map(|t| t.topic.name.clone()).collect();
+    if names.is_empty() || filter.from == 0 {
+        return Ok(Vec::new());
+    }
+    let topics = TopicPattern::new(&names, None, None)?;
+    let mut messages = bag.messages(&Filter { topics, from: 0, until: filter.from - 1 })?;
+    let mut held: Vec<(usize, Vec<u8>)> = Vec::new();
+    while let Some(message) = messages.next()? {
+        let same = |(topic, _): &(usize, Vec<u8>)| *topic == message.topic;
+        if held.iter().filter(|held| same(held)).count() >= depth(&bag.topics()[message.topic])
+            && let Some(oldest) = held.iter().position(same)
+        {
+            held.remove(oldest);
+        }
+        held.push((message.topic, message.data.to_vec()));
+    }
+    Ok(held)
+}
