@@ -13,6 +13,7 @@ pub mod play;
 pub mod qos;
 mod reader;
 pub mod record;
+mod ros_qos;
 pub mod schema;
 mod topic;
 mod writer;

@@ -5,14 +5,16 @@
 mod common;
 
 use std::{
-    io::{BufRead, BufReader},
     path::Path,
-    process::{Child, Command, ExitStatus, Stdio},
+    process::Command,
     time::{Duration, Instant},
 };
 
-use common::{TICK, stamp, state};
-use serde_json::Value;
+use common::{
+    TICK,
+    program::{PATIENCE, Program, call, client, node, wait_until},
+    stamp, state,
+};
 use swath_bags::{Bag, Filter, ops::validate::validate};
 use swath_msgs::{
     diagnostic_msgs::{DiagnosticArray, DiagnosticStatus},
@@ -24,69 +26,13 @@ use swath_msgs::{
     tf2_msgs::TFMessage,
 };
 use swath_ros::{
-    Cdr, Client, Environment, Mapping, Node, RosArgs, Subscription, graph,
+    Cdr, Subscription, graph,
     qos::{History, QosProfile},
 };
 
-const PATIENCE: Duration = Duration::from_secs(60);
-
-fn node(domain: u16) -> Node {
-    let environment = Environment { domain, localhost_only: false, mapping: Mapping::Cyclone };
-    let words = ["--ros-args", "-r", "__node:=tester", "--disable-rosout-logs"].map(str::to_owned);
-    let (_, args) = RosArgs::split(words).unwrap();
-    Node::start_in(environment, graph::OPERATOR, &args).unwrap()
-}
-
-struct Recorder {
-    child: Child,
-    lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
-}
-
-impl Recorder {
-    /// Starts a recorder and waits until it is ready.
-    fn start(domain: u16, dir: &Path, words: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
-        command.args(["record", "-o", "bag"]).args(words);
-        Self::spawn(command, domain, dir)
-    }
-
-    fn spawn(mut command: Command, domain: u16, dir: &Path) -> Self {
-        command.current_dir(dir).env("ROS_DOMAIN_ID", domain.to_string()).stdout(Stdio::piped());
-        let mut child = command.spawn().unwrap();
-        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let mut recorder = Self { child, lines };
-        let ready = recorder.line();
-        assert_eq!(ready["event"], "ready");
-        recorder
-    }
-
-    fn line(&mut self) -> Value {
-        serde_json::from_str(&self.lines.next().unwrap().unwrap()).unwrap()
-    }
-
-    /// Waits for the end; returns the line about the closed bag, if there is one.
-    fn end(mut self) -> (ExitStatus, Option<Value>) {
-        let closed = self.lines.next().map(|line| serde_json::from_str(&line.unwrap()).unwrap());
-        (self.child.wait().unwrap(), closed)
-    }
-
-    fn interrupt(self) -> (ExitStatus, Value) {
-        let pid = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
-        let (status, closed) = self.end();
-        (status, closed.unwrap())
-    }
-}
-
-/// Waits until something holds.
-fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !holds() {
-        assert!(start.elapsed() < PATIENCE, "waited too long until {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    // The other side of a match may not be there yet.
-    std::thread::sleep(Duration::from_millis(400));
+/// A recorder that is ready; its bag is `dir/bag`.
+fn recorder(domain: u16, dir: &Path, words: &[&str]) -> Program {
+    Program::start(domain, dir, &[&["record", "-o", "bag"], words].concat())
 }
 
 /// Log times of a topic's messages.
@@ -105,7 +51,7 @@ fn times(bag: &Bag, topic: &str) -> Vec<u64> {
 fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     let temp = tempfile::tempdir().unwrap();
     let node = node(30);
-    let recorder = Recorder::start(30, temp.path(), &["-x", "/rosout|/parameter_events|/diagnostics"]);
+    let recorder = recorder(30, temp.path(), &["-x", "/rosout|/parameter_events|/diagnostics"]);
     let clock = node.publisher(&graph::CLOCK).unwrap();
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     let frames = node.publisher(&graph::TF).unwrap();
@@ -116,11 +62,11 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     wait_until("the recorder listens", || {
         clock.matched() * states.matched() * frames.matched() * upcoming.matched() * foreign.matched() > 0
     });
-    for tick in 0..500 {
+    for tick in 1..=500 {
         clock.publish(&Clock { clock: stamp(tick * TICK) }).unwrap();
         states.publish(&state(tick)).unwrap();
     }
-    let header = Header { stamp: stamp(499 * TICK), ..Header::default() };
+    let header = Header { stamp: stamp(500 * TICK), ..Header::default() };
     let transform = TransformStamped { header, transform: Transform::default(), ..TransformStamped::default() };
     frames.publish(&TFMessage { transforms: vec![transform] }).unwrap();
     foreign.publish(Cdr::from_bytes(vec![0, 1, 0, 0, 42])).unwrap();
@@ -135,11 +81,11 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     assert_eq!(report.faults, [""; 0]);
     assert_eq!(report.warnings, ["/foreign: no schema known for foreign_msgs/msg/Thing"]);
     let bag = Bag::open(&temp.path().join("bag")).unwrap();
-    let ticks: Vec<u64> = (0..500).map(|tick| tick * TICK).collect();
+    let ticks: Vec<u64> = (1..=500).map(|tick| tick * TICK).collect();
     assert_eq!(times(&bag, "/clock"), ticks);
     assert_eq!(times(&bag, "/swath/spacecraft/state"), ticks);
-    assert_eq!(times(&bag, "/tf"), [499 * TICK], "the time of the first transform");
-    assert_eq!(times(&bag, "/foreign"), [499 * TICK], "the last time of /clock");
+    assert_eq!(times(&bag, "/tf"), [500 * TICK], "the time of the first transform");
+    assert_eq!(times(&bag, "/foreign"), [500 * TICK], "the last time of /clock");
     assert_eq!(times(&bag, "/swath/requests/upcoming").len(), 1, "latched topics come late");
     assert!(bag.topics().iter().all(|topic| topic.topic.name != "/rosout"));
     let upcoming = bag.topics().iter().find(|t| t.topic.name == "/swath/requests/upcoming").unwrap();
@@ -150,23 +96,13 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
 fn services_pause_resume_split_and_stop() {
     let temp = tempfile::tempdir().unwrap();
     let node = node(31);
-    let recorder = Recorder::start(31, temp.path(), &["/swath/spacecraft/state"]);
+    let recorder = recorder(31, temp.path(), &["/swath/spacecraft/state"]);
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
-    fn call<S: swath_msgs::RosService>(client: &Client<S>) -> S::Response {
-        client.call(S::Request::default(), PATIENCE).unwrap()
-    }
-    macro_rules! client {
-        ($kind:ty, $name:literal) => {{
-            let client = node.client::<$kind>(&graph::Service::new($name, &[], &[])).unwrap();
-            node.wait_for_service(&client, PATIENCE).unwrap();
-            client
-        }};
-    }
-    let pause = client!(Pause, "/swath/recorder/pause");
-    let resume = client!(Resume, "/swath/recorder/resume");
-    let is_paused = client!(IsPaused, "/swath/recorder/is_paused");
-    let split = client!(SplitBagfile, "/swath/recorder/split_bagfile");
-    let stop = client!(Stop, "/swath/recorder/stop");
+    let pause = client::<Pause>(&node, "/swath/recorder/pause");
+    let resume = client::<Resume>(&node, "/swath/recorder/resume");
+    let is_paused = client::<IsPaused>(&node, "/swath/recorder/is_paused");
+    let split = client::<SplitBagfile>(&node, "/swath/recorder/split_bagfile");
+    let stop = client::<Stop>(&node, "/swath/recorder/stop");
     wait_until("the recorder listens", || states.matched() > 0);
     // What was sent before a call is taken before the call is answered.
     let send = |ticks: std::ops::Range<u64>| {
@@ -175,7 +111,7 @@ fn services_pause_resume_split_and_stop() {
         std::thread::sleep(Duration::from_millis(300));
     };
     assert!(!call(&is_paused).paused);
-    send(0..10);
+    send(1..10);
     call(&pause);
     assert!(call(&is_paused).paused);
     send(10..20);
@@ -188,7 +124,7 @@ fn services_pause_resume_split_and_stop() {
     assert!(status.success());
     assert_eq!(closed.unwrap()["files"], 2);
     let bag = Bag::open(&temp.path().join("bag")).unwrap();
-    let expected: Vec<u64> = (0..10).chain(20..40).map(|tick| tick * TICK).collect();
+    let expected: Vec<u64> = (1..10).chain(20..40).map(|tick| tick * TICK).collect();
     assert_eq!(times(&bag, "/swath/spacecraft/state"), expected);
     assert_eq!(validate(bag.path(), None).unwrap().faults, [""; 0]);
 }
@@ -212,7 +148,7 @@ fn a_full_disk_ends_recording_with_an_alarm_and_a_readable_bag() {
     let script = "trap '' XFSZ; ulimit -f 60; exec \"$0\" record -o bag --compression none --chunk-size 4096 /swath/spacecraft/state";
     let mut command = Command::new("bash");
     command.args(["-c", script, env!("CARGO_BIN_EXE_swath-bag-core")]);
-    let recorder = Recorder::spawn(command, 32, temp.path());
+    let recorder = Program::spawn(command, 32, temp.path());
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     wait_until("the recorder listens", || states.matched() > 0 && diagnostics.matched() > 0);
     let mut alarm = DiagnosticStatus::OK;

@@ -37,7 +37,7 @@ pub struct PlayArgs {
     #[arg(short, long, default_value_t = 1.0, value_parser = rate)]
     rate: f64,
     /// Start anew at the end
-    #[arg(short, long = "loop")]
+    #[arg(short = 'l', long = "loop")]
     repeat: bool,
     /// Start so long after the bag's start [s]
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]

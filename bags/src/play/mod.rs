@@ -24,7 +24,7 @@ use crate::{
     error::{BagError, Result, chain},
     qos::{Durability, QosOverride, QosProfile},
     reader::{Bag, BagTopic, Filter, TopicPattern},
-    record::qos::to_ros,
+    ros_qos::to_ros,
 };
 
 /// The topic of simulated time.
@@ -35,6 +35,9 @@ const CHORES: Duration = Duration::from_millis(20);
 const TURN: usize = 256;
 /// How long readers may take to acknowledge the last messages [wall time].
 const LAST_MESSAGES: Duration = Duration::from_secs(5);
+/// How long the publishers stay after that: RustDDS drops what a reader has not yet taken when its
+/// writer goes [wall time].
+const FAREWELL: Duration = Duration::from_millis(500);
 
 /// What is played, and how.
 #[derive(Debug, Clone)]
@@ -122,6 +125,7 @@ impl Player {
         self.play(&mut engine, &control, keys.as_ref(), from, shutdown)?;
         let wall = start.elapsed();
         engine.flush(LAST_MESSAGES);
+        std::thread::sleep(FAREWELL);
         Ok(PlaySummary {
             published: engine.published,
             refused: engine.refused,

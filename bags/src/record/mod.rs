@@ -1,7 +1,6 @@
 //! Records topics of a ROS 2 domain: CDR bytes from DDS into a bag, as they come.
 
 mod control;
-pub(crate) mod qos;
 mod source;
 mod stamp;
 
@@ -20,6 +19,7 @@ use self::{
 use crate::{
     error::{BagError, Result},
     reader::TopicPattern,
+    ros_qos,
     topic::Topic,
     writer::{BagOptions, BagSummary, BagWriter, Counter},
 };
@@ -294,7 +294,7 @@ impl Recorder {
         for entry in graph::TOPICS {
             let name = self.node.names().resolve(entry.name)?;
             if self.options.topics.selects(&name) {
-                let offered = qos::to_bag(&entry.profile.qos());
+                let offered = ros_qos::to_bag(&entry.profile.qos());
                 self.subscribe(&name, entry.type_name, offered, Some(entry))?;
             }
         }
@@ -307,7 +307,7 @@ impl Recorder {
         for writer in self.node.remote_writers() {
             let known = self.sources.iter().any(|source| source.name == writer.topic);
             if !known && !self.passed_over.contains(&writer.topic) {
-                offers.entry((writer.topic, writer.type_name)).or_default().push(qos::to_bag(&writer.qos));
+                offers.entry((writer.topic, writer.type_name)).or_default().push(ros_qos::to_bag(&writer.qos));
             }
         }
         for ((name, type_name), offers) in offers {
@@ -316,7 +316,7 @@ impl Recorder {
                 self.passed_over.insert(name);
                 continue;
             }
-            let offered = qos::to_bag(&qos::to_read(&offers, 1));
+            let offered = ros_qos::to_bag(&ros_qos::to_read(&offers, 1));
             if let Err(error) = self.subscribe(&name, &type_name, offered, None) {
                 tracing::warn!("{name} is not recorded: {}", crate::error::chain(&error));
                 self.passed_over.insert(name);
@@ -338,7 +338,7 @@ impl Recorder {
         }
         let (schema, hash) = known.map_or(("", ""), |k| (k.schema, k.type_hash));
         let topic = Topic::new(name, type_name, schema, hash, vec![offered])?;
-        let reading = qos::to_read(&[offered], self.options.depth);
+        let reading = ros_qos::to_read(&[offered], self.options.depth);
         let subscription = self.node.raw_subscription(name, type_name, &reading)?;
         let id = self.writer.add_topic(&topic)?;
         self.sources.push(Source::new(&topic, id, subscription, entry)?);

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test binary uses some of these")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
+pub mod program;
+
 use std::{
     path::{Path, PathBuf},
     process::Command,

@@ -29,7 +29,6 @@ pub(crate) fn to_bag(profile: &RosProfile) -> QosProfile {
     }
 }
 
-#[cfg(test)]
 /// A profile to write with; what DDS here does not know becomes the default.
 pub(crate) fn to_ros(profile: &QosProfile) -> RosProfile {
     let reliability = match profile.reliability {
@@ -65,7 +64,6 @@ fn duration(limit: Option<Duration>) -> QosDuration {
     limit.map_or(QosDuration::INFINITE, |d| QosDuration { sec: d.as_secs(), nsec: d.subsec_nanos().into() })
 }
 
-#[cfg(test)]
 fn limited(duration: QosDuration) -> Option<Duration> {
     let whole = Duration::from_secs(duration.sec);
     (duration != QosDuration::INFINITE && duration != QosDuration { sec: 0, nsec: 0 })
