@@ -64,6 +64,10 @@ pub struct SpacecraftConfig {
     /// Speed at which a wheel takes no more torque that would speed it up [rpm].
     pub wheel_speed_max_rpm: f64,
     /// A mission's wheels start at uniform speeds up to this [rpm].
+    ///
+    /// The paper prints no value. The default is calibrated to its operating points: with 1300 rpm the best fixed
+    /// transition time is 80 s, as in the paper, and 83 % of attempts succeed (paper: 81 %), 97 % at 120 s (99 %).
+    /// With BSK-RL's default of 1500 rpm those are 90 s, 78 % and 94 %.
     pub wheel_speed_initial_max_rpm: f64,
     /// A mission's body rates start uniform up to this, per axis [rad/s].
     pub rate_initial_max_rad_s: f64,
@@ -156,7 +160,7 @@ impl Default for SpacecraftConfig {
             wheel_inertia_kg_m2: 50.0 / (6000.0 * RAD_S_PER_RPM),
             wheel_torque_max_nm: 0.3,
             wheel_speed_max_rpm: 6000.0,
-            wheel_speed_initial_max_rpm: 1500.0,
+            wheel_speed_initial_max_rpm: 1300.0,
             rate_initial_max_rad_s: 1e-4,
         }
     }
