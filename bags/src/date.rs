@@ -1,7 +1,7 @@
 //! Dates for people, in UTC.
 
 /// `2026-01-31 12:00:00` of seconds since 1970.
-pub(crate) fn date(seconds: u64) -> String {
+pub fn date(seconds: u64) -> String {
     let (year, month, day) = civil(seconds / 86_400);
     let (hour, minute, second) = of_day(seconds);
     format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}")

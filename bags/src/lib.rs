@@ -4,7 +4,7 @@
 //! `metadata.yaml`. This crate knows message types only by their schema texts.
 
 pub mod cli;
-mod date;
+pub mod date;
 mod error;
 mod file;
 pub mod metadata;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use swath_sim::env::{Env, TaskRecord};
 use swath_sim::model::Model;
 use swath_sim::planner::{Planner, PlannerError};
-use swath_sim::strip::StripId;
+use swath_sim::time::Tick;
 use thiserror::Error;
 
 use crate::mission::{Mission, MissionError};
@@ -47,9 +47,14 @@ impl InProcessMission {
 
     /// Adds requests at the present decision.
     pub fn submit(&mut self, requests: &[NamedRequest]) {
+        self.submit_since(requests, self.env.now());
+    }
+
+    /// Adds requests that came at an earlier tick.
+    pub fn submit_since(&mut self, requests: &[NamedRequest], since: Tick) {
         self.requested += requests.len();
         for named in requests {
-            let results = self.env.submit(std::slice::from_ref(&named.request));
+            let results = self.env.submit_since(std::slice::from_ref(&named.request), since);
             self.accepted += results.iter().filter(|result| result.is_ok()).count();
             // A bidirectional request adds a twin of the same name.
             self.names.resize(self.env.catalogue().len(), named.name.clone());
@@ -77,9 +82,24 @@ impl InProcessMission {
         planner: &mut dyn Planner,
         mut each: impl FnMut(&TaskRecord, TaskLine),
     ) -> Result<(), InProcessError> {
-        let names = &self.names;
-        let name_of = |id: StripId| names.get(id.0 as usize - 1).map(String::as_str);
-        self.env.run(planner, |record| each(record, TaskLine::new(record, record.strip.and_then(name_of))))?;
+        while let Some((record, line)) = self.step(planner)? {
+            each(&record, line);
+        }
         Ok(())
+    }
+
+    /// Decides and flies one task; nothing at the end of the mission.
+    ///
+    /// # Errors
+    /// When the planner gave no usable decision.
+    pub fn step(&mut self, planner: &mut dyn Planner) -> Result<Option<(TaskRecord, TaskLine)>, InProcessError> {
+        if self.env.truncated() {
+            return Ok(None);
+        }
+        let decision = planner.decide(&self.env.context())?;
+        let record = self.env.step_to_horizon(decision)?.record;
+        let name = record.strip.and_then(|id| self.names.get(id.0 as usize - 1)).map(String::as_str);
+        let line = TaskLine::new(&record, name);
+        Ok(Some((record, line)))
     }
 }

@@ -3,6 +3,7 @@
 //! A node is two files: `logic.rs`, which knows no ROS, and `wiring.rs`, which knows nothing else.
 #![expect(non_snake_case, reason = "frame letters")]
 
+pub mod bag;
 pub mod from_msg;
 pub mod guidance;
 pub mod in_process;

@@ -134,8 +134,16 @@ impl Env {
 
     /// Adds requests at the present decision. Each one's identity or refusal, in order.
     pub fn submit(&mut self, requests: &[StripRequest]) -> Vec<Result<StripId, crate::error::StripError>> {
-        let now = self.now();
-        let results = requests.iter().map(|request| self.catalogue.add(&self.model, request, now)).collect();
+        self.submit_since(requests, self.now())
+    }
+
+    /// Adds requests that came at an earlier tick: their windows are sought from there.
+    pub fn submit_since(
+        &mut self,
+        requests: &[StripRequest],
+        since: Tick,
+    ) -> Vec<Result<StripId, crate::error::StripError>> {
+        let results = requests.iter().map(|request| self.catalogue.add(&self.model, request, since)).collect();
         self.refresh();
         results
     }

@@ -1,13 +1,13 @@
-//! Record, play and inspect rosbag2 bags over MCAP.
+//! Record, play, inspect, re-fly and report rosbag2 bags over MCAP.
 
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::Parser;
-use swath_bags::cli::Command;
-use swath_bags::{BagError, chain};
+use swath_nodes::bag::Command;
 use swath_ros::RosArgs;
 
-/// Record, play and inspect rosbag2 bags over MCAP.
+/// Record, play, inspect, re-fly and report rosbag2 bags over MCAP.
 #[derive(Parser)]
 #[command(version, about)]
 struct Args {
@@ -19,13 +19,13 @@ fn main() -> ExitCode {
     match run() {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {}", chain(&error));
+            eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
     }
 }
 
-fn run() -> Result<ExitCode, BagError> {
+fn run() -> Result<ExitCode> {
     let (words, ros) = RosArgs::split(std::env::args())?;
     Args::parse_from(words).command.run(&ros)
 }

@@ -1,0 +1,45 @@
+//! `swath-bag report`: a recorded mission as one page that needs no network.
+
+mod figures;
+mod page;
+mod story;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use super::recorded::{NAMESPACE, Recorded};
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  swath-bag report bags/samples/mission -o out/report.html
+
+The page holds the ground track and the strips on a map, the tasks over time, attitude error, wheel speeds and
+torques, reward, request states, and each decision with its candidates.")]
+pub struct ReportArgs {
+    /// Bag directory or .mcap file of a mission
+    bag: PathBuf,
+    /// The page
+    #[arg(short, long, default_value = "report.html")]
+    output: PathBuf,
+    /// Namespace of the mission's nodes
+    #[arg(long, default_value = NAMESPACE)]
+    namespace: String,
+}
+
+impl ReportArgs {
+    /// Writes the page.
+    ///
+    /// # Errors
+    /// When the bag holds no mission or the page cannot be written.
+    pub fn run(self) -> Result<ExitCode> {
+        let recorded = Recorded::open(&self.bag, &self.namespace)?;
+        let page = page::page(&recorded, &story::Story::of(&recorded)?)?;
+        fs::write(&self.output, page).with_context(|| format!("cannot write {}", self.output.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
