@@ -29,7 +29,7 @@ const MESSAGE_BYTES: usize = 300;
 const RECORDED: u64 = 1_000_000;
 const RATE: u64 = 50_000;
 /// A domain of its own, so that nothing else is recorded.
-const DOMAIN: &str = "39";
+const DOMAIN: &str = "139";
 
 fn main() {
     let args: Vec<String> = env::args().skip(1).collect();

@@ -231,6 +231,28 @@ fn a_loop_begins_anew_until_it_is_interrupted() {
 }
 
 #[test]
+fn a_recorded_mission_is_played_again() {
+    let node = node(39);
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
+    let player = Program::start(39, &samples, &["play", "mission", "-r", "0", "-p"]);
+    let tasks = node.subscription_with_depth(&graph::PLANNER_TASK, 4096).unwrap();
+    wait_until("the player is heard", || tasks.matched() > 0);
+    call(&client::<Resume>(&node, "/swath/player/resume"));
+    let mut numbers = Vec::new();
+    wait_until("the tasks have come", || {
+        while let Some(task) = tasks.take().unwrap() {
+            numbers.push(task.task);
+        }
+        numbers.len() >= 17
+    });
+    assert_eq!(numbers, (0..17).collect::<Vec<_>>());
+    let (status, done) = player.end();
+    assert!(status.success());
+    let recorded = Bag::open(&samples.join("mission")).unwrap().message_count();
+    assert_eq!(done.unwrap()["messages"], recorded);
+}
+
+#[test]
 fn keys_pause_and_step() {
     let temp = folder();
     let node = node(38);
