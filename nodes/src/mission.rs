@@ -7,12 +7,12 @@ use swath_sim::config::SimConfig;
 use swath_sim::env::horizon;
 use swath_sim::error::SimError;
 use swath_sim::model::Model;
+use swath_sim::planner::PlannerSpec;
 use swath_sim::rng;
 use swath_sim::scenario::{InitialState, ScenarioConfig};
 use swath_sim::time::Tick;
 use thiserror::Error;
 
-use crate::planners::PlannerSpec;
 use crate::requests_file::{self, NamedRequest, RequestsFileError};
 
 /// Why a mission cannot be flown.
@@ -68,7 +68,8 @@ pub struct Mission {
     pub pace: f64,
     /// Simulated time of the mission's epoch [s since 1970-01-01 UTC].
     pub epoch_unix_s: u32,
-    /// Planner: `lookahead`, `lookahead:TICKS` of margin, `heuristic:SECONDS` or `random`.
+    /// Planner: `lookahead`, `lookahead:TICKS` of margin, `heuristic:SECONDS`, `random`, or a kind of policy, such as
+    /// `hop-ppo` for the shipped one and `hop-ppo:FILE` for another; see [`PlannerSpec`].
     pub planner: PlannerSpec,
     /// Strips known from the start.
     pub requests: MissionRequests,
@@ -124,6 +125,7 @@ impl Mission {
         let mut mission: Self = toml::from_str(&text)
             .map_err(|source| MissionError::Parse { path: path.to_owned(), source: Box::new(source) })?;
         let folder = path.parent().unwrap_or(Path::new(""));
+        mission.planner.resolve(&std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()));
         for file in &mut mission.requests.files {
             *file = folder.join(&*file);
         }

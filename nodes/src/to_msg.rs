@@ -253,15 +253,19 @@ pub fn decision(stamper: &Stamper, planned: &Planned, upcoming: &Upcoming, compu
         Decision::Image { candidate, t_pre } => (candidate as u32, t_pre),
         Decision::Wait { .. } => (upcoming.candidates.len() as u32, 0),
     };
+    let mut rationale = planned.rationale.clone().unwrap_or_default();
+    rationale.probabilities.truncate(upcoming.candidates.len());
     msg::Decision {
         header: stamper.header(planned.situation.now, EARTH_FRAME),
         task: planned.task,
         planner: planned.planner.clone(),
+        policy_hash: rationale.policy,
         candidate_ids: upcoming.candidates.iter().map(|candidate| candidate.id.0).collect::<Vec<_>>(),
+        probabilities: rationale.probabilities,
+        value: rationale.value,
         chosen,
         t_pre_ticks,
         compute_time_s,
-        ..msg::Decision::default()
     }
 }
 

@@ -20,7 +20,7 @@ fn tasks(mission: &Path, out: &Path, words: &[&str]) -> String {
 fn missions_over_dds_and_in_one_process_are_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let mission = common::write_mission(folder.path(), MISSION);
-    for planner in ["heuristic:80", "random", "lookahead"] {
+    for planner in ["heuristic:80", "random", "lookahead", "hop-ppo"] {
         for seed in ["1", "2", "3"] {
             let words = ["--planner", planner, "--seed", seed];
             let out = |kind: &str| folder.path().join(format!("{planner}-{seed}-{kind}"));
@@ -30,4 +30,22 @@ fn missions_over_dds_and_in_one_process_are_the_same() {
             assert!(in_process.lines().count() > 20);
         }
     }
+}
+
+#[test]
+fn the_heuristic_takes_over_from_a_policy_that_is_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let mission = common::write_mission(folder.path(), "orbits = 0.5\n[requests.random]\ncount = [1500, 1500]\n");
+    let missing = format!("hop-ppo:{}", folder.path().join("missing.safetensors").display());
+    let over_dds = tasks(&mission, &folder.path().join("dds"), &["--planner", &missing]);
+    let in_process = tasks(&mission, &folder.path().join("in-process"), &["--planner", &missing, "--in-process"]);
+    let heuristic = tasks(&mission, &folder.path().join("heuristic"), &["--planner", "heuristic:90", "--in-process"]);
+    assert_eq!((&over_dds, &in_process), (&heuristic, &heuristic));
+    let bag = folder.path().join("dds/bag");
+    let mut cat = common::command("swath-bag", "0");
+    let alarms = common::succeed(cat.arg("cat").arg(bag).args(["--topic", "/diagnostics"]));
+    assert!(
+        alarms.contains("missing.safetensors: No such file") && alarms.contains("heuristic:90 takes over"),
+        "{alarms}"
+    );
 }

@@ -55,6 +55,12 @@ pub enum TrainingError {
         /// Its value in this run.
         wanted: String,
     },
+    /// No policy of this kind is part of the program.
+    #[error("no {kind} policy is shipped: name a file, {kind}:FILE")]
+    NotShipped {
+        /// The kind.
+        kind: String,
+    },
     /// Nothing to resume from.
     #[error("{path} holds no checkpoint")]
     NoCheckpoint {

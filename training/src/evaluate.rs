@@ -1,7 +1,5 @@
 //! Missions flown by planners on the same seeds, and statistics of what came out.
 
-use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -9,83 +7,10 @@ use serde::Serialize;
 use swath_sim::config::SimConfig;
 use swath_sim::env::{Env, EpisodeConfig, Totals};
 use swath_sim::model::Model;
-use swath_sim::planner::{Heuristic, Lookahead, Planner, Random};
+use swath_sim::planner::{Planner, PlannerSpec};
 
 use crate::error::{Result, TrainingError};
-use crate::policy::{LearnedPlanner, Policy};
-
-/// A planner by name: `random`, `lookahead`, `heuristic:T` with T in seconds, or `KIND:FILE` with a policy file.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PlannerSpec {
-    /// Uniformly random strip and transition.
-    Random,
-    /// Flies each candidate in its head before it decides.
-    Lookahead,
-    /// Fixed transition time [s].
-    Heuristic(f64),
-    /// A trained policy.
-    Learned {
-        /// Kind of network that the file must hold.
-        kind: String,
-        /// Policy or checkpoint.
-        path: PathBuf,
-    },
-}
-
-impl FromStr for PlannerSpec {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<PlannerSpec, String> {
-        match text.split_once(':') {
-            None if text == "random" => Ok(PlannerSpec::Random),
-            None if text == "lookahead" => Ok(PlannerSpec::Lookahead),
-            Some(("heuristic", seconds)) => match seconds.parse::<f64>() {
-                Ok(seconds) if (0.0..=600.0).contains(&seconds) => Ok(PlannerSpec::Heuristic(seconds)),
-                _ => Err(format!("{seconds} is not a transition time of 0 to 600 s")),
-            },
-            Some((kind @ ("hop-ppo" | "hop-ppo-mlp" | "h-ppo" | "discrete-ppo"), path)) => {
-                Ok(PlannerSpec::Learned { kind: kind.into(), path: path.into() })
-            }
-            _ => Err(format!(
-                "{text} is none of random, lookahead, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE, discrete-ppo:FILE"
-            )),
-        }
-    }
-}
-
-impl std::fmt::Display for PlannerSpec {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            PlannerSpec::Random => write!(f, "random"),
-            PlannerSpec::Lookahead => write!(f, "lookahead"),
-            PlannerSpec::Heuristic(seconds) => write!(f, "heuristic:{seconds}"),
-            PlannerSpec::Learned { kind, path } => write!(f, "{kind}:{}", path.display()),
-        }
-    }
-}
-
-impl PlannerSpec {
-    /// Makes the planner for an episode.
-    ///
-    /// # Errors
-    /// A policy file that cannot be read or holds another kind.
-    pub fn planner(&self, seed: u64) -> Result<Box<dyn Planner>> {
-        Ok(match self {
-            PlannerSpec::Random => Box::new(Random { seed }),
-            PlannerSpec::Lookahead => Box::new(Lookahead { margin: 0 }),
-            PlannerSpec::Heuristic(t_pre_s) => Box::new(Heuristic { t_pre_s: *t_pre_s }),
-            PlannerSpec::Learned { kind, path } => {
-                let policy = Policy::load(path)?;
-                let found = policy.run().network.kind();
-                if found != kind {
-                    let reason = format!("it holds a {found} policy, not {kind}");
-                    return Err(TrainingError::damaged(path, reason));
-                }
-                Box::new(LearnedPlanner::new(policy))
-            }
-        })
-    }
-}
+use crate::planners;
 
 /// Which missions to fly.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,7 +80,7 @@ pub fn fly(missions: &Missions, planners: &[PlannerSpec]) -> Result<Vec<Vec<Miss
             // One catalogue serves all planners: its windows take longer than flying.
             let env = Env::episode(model.clone(), &missions.episode, seed);
             let flown = planners.iter().map(|spec| {
-                let mut planner = spec.planner(seed)?;
+                let mut planner = planners::make(spec, seed)?;
                 mission(env.clone(), planner.as_mut(), seed, missions.episode.orbits)
             });
             flown.collect::<Result<Vec<Mission>>>()
@@ -219,19 +144,6 @@ fn student_975(freedom: f64) -> f64 {
 mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
-
-    #[test]
-    fn planners_are_read_from_their_names() {
-        let read = |text: &str| text.parse::<PlannerSpec>();
-        assert_eq!(read("heuristic:80"), Ok(PlannerSpec::Heuristic(80.0)));
-        assert_eq!(read("random"), Ok(PlannerSpec::Random));
-        assert_eq!(read("lookahead"), Ok(PlannerSpec::Lookahead));
-        let learned = read("h-ppo:folder/a.safetensors").unwrap();
-        assert_eq!(learned.to_string(), "h-ppo:folder/a.safetensors");
-        for wrong in ["heuristic", "heuristic:-1", "heuristic:nan", "ppo:x", ""] {
-            assert!(read(wrong).is_err(), "{wrong}");
-        }
-    }
 
     #[test]
     fn spreads_follow_student() {

@@ -11,6 +11,7 @@ pub mod figures;
 pub mod gae;
 pub mod network;
 pub mod parameters;
+pub mod planners;
 pub mod policy;
 pub mod ppo;
 pub mod process;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use swath_sim::observation::{ObservationSet, observe};
-use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Rationale};
 use tch::{Device, Tensor};
 
 use crate::checkpoint;
@@ -55,7 +55,16 @@ impl Policy {
             let reason = format!("it has {size} bytes, a policy has at most {LARGEST_FILE}");
             return Err(TrainingError::damaged(path, reason));
         }
-        let content = Content::read(path)?;
+        let bytes = std::fs::read(path).map_err(TrainingError::file("read", path))?;
+        Policy::from_bytes(&bytes, path)
+    }
+
+    /// As [`Policy::load`], with the bytes of a file already at hand; `path` is what errors name.
+    ///
+    /// # Errors
+    /// As [`Policy::load`].
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Policy> {
+        let content = Content::from_bytes(bytes, path)?;
         let header = checkpoint::header(&content, path)?;
         let EnvironmentConfig::Strips(strips) = &header.run.environment else {
             return Err(TrainingError::damaged(path, "it was not trained on strips"));
@@ -178,6 +187,15 @@ impl LearnedPlanner {
 impl Planner for LearnedPlanner {
     fn name(&self) -> String {
         self.policy.run.network.kind().to_owned()
+    }
+
+    fn rationale(&self) -> Option<Rationale> {
+        let judgement = self.judgement.as_ref()?;
+        Some(Rationale {
+            probabilities: judgement.probabilities.clone(),
+            value: judgement.value,
+            policy: self.policy.digest.clone(),
+        })
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {

@@ -13,6 +13,8 @@ use clap::Subcommand;
 use swath_bags::chain;
 use swath_ros::RosArgs;
 
+use crate::planners::PlannerMaker;
+
 /// All commands of `swath-bag`.
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -29,14 +31,14 @@ pub enum Command {
 
 impl Command {
     /// Runs the command; results go to stdout, progress and warnings to stderr. `ros` is what stood
-    /// after `--ros-args`.
+    /// after `--ros-args`, `maker` makes the planner that flies a mission again.
     ///
     /// # Errors
     /// Whatever kept the command from running to its end.
-    pub fn run(self, ros: &RosArgs) -> Result<ExitCode> {
+    pub fn run(self, ros: &RosArgs, maker: PlannerMaker) -> Result<ExitCode> {
         match self {
             Self::Bag(command) => command.run(ros).map_err(|error| anyhow::anyhow!(chain(&error))),
-            Self::Refly(args) => args.run(),
+            Self::Refly(args) => args.run(maker),
             Self::Report(args) => args.run(),
             Self::Export(args) => args.run(),
         }

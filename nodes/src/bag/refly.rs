@@ -10,11 +10,11 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use swath_sim::env::{TaskRecord, Totals};
-use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, PlannerSpec};
 
 use super::recorded::{NAMESPACE, Recorded};
 use crate::in_process::InProcessMission;
-use crate::planners::PlannerSpec;
+use crate::planners::{GuardedPlanner, PlannerMaker};
 use crate::record::TaskLine;
 
 /// Arguments of `refly`.
@@ -99,11 +99,11 @@ impl ReflyArgs {
     /// # Errors
     /// When the bag holds no mission from its beginning, or the planner fails.
     #[expect(clippy::print_stdout, reason = "the comparison is this command's result")]
-    pub fn run(self) -> Result<ExitCode> {
+    pub fn run(self, maker: PlannerMaker) -> Result<ExitCode> {
         let recorded = Recorded::open(&self.bag, &self.namespace)?;
         let own = recorded.mission.planner.clone();
         let planner = self.planner.unwrap_or_else(|| own.clone());
-        let flown = fly(&recorded, &planner)?;
+        let flown = fly(&recorded, &planner, maker)?;
         if let Some(path) = &self.tasks {
             let lines: Result<String> = flown.tasks.iter().map(|(_, line)| Ok(json_line(line)? + "\n")).collect();
             fs::write(path, lines?).with_context(|| format!("cannot write {}", path.display()))?;
@@ -123,8 +123,9 @@ fn json_line(line: &TaskLine) -> Result<String> {
 }
 
 /// Flies a recorded mission in process; each request comes at the decision at which it came then.
-fn fly(recorded: &Recorded, planner: &PlannerSpec) -> Result<Flown> {
-    let mut planner = Watching { planner: planner.make(recorded.mission.seed), candidates: Vec::new() };
+fn fly(recorded: &Recorded, planner: &PlannerSpec, maker: PlannerMaker) -> Result<Flown> {
+    let mut planner =
+        Watching { planner: GuardedPlanner::new(maker(planner, recorded.mission.seed)?), candidates: Vec::new() };
     let mut flight = InProcessMission::new(&recorded.mission)?;
     let arrivals = recorded.arrivals()?;
     let mut arrivals = arrivals.iter().peekable();
@@ -142,7 +143,7 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec) -> Result<Flown> {
 
 /// A planner whose choices are noted.
 struct Watching {
-    planner: Box<dyn Planner + Send>,
+    planner: GuardedPlanner,
     candidates: Vec<Vec<u64>>,
 }
 

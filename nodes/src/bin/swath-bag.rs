@@ -27,5 +27,5 @@ fn main() -> ExitCode {
 
 fn run() -> Result<ExitCode> {
     let (words, ros) = RosArgs::split(std::env::args())?;
-    Args::parse_from(words).command.run(&ros)
+    Args::parse_from(words).command.run(&ros, |spec, seed| Ok(swath_training::planners::make(spec, seed)?))
 }

@@ -26,7 +26,7 @@ enum Command {
 #[expect(clippy::print_stdout, reason = "the diagram is this command's result")]
 fn main() -> ExitCode {
     node::exit_code(match Args::parse().command {
-        Command::Launch(args) => launch::run(&args),
+        Command::Launch(args) => launch::run(&args, |spec, seed| Ok(swath_training::planners::make(spec, seed)?)),
         Command::Strips(args) => strips::run(&args),
         Command::Graph => {
             print!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table());

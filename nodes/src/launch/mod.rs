@@ -11,11 +11,12 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 use swath_sim::env::Totals;
+use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::scenario::ScenarioConfig;
 
 use crate::in_process::InProcessMission;
 use crate::mission::Mission;
-use crate::planners::PlannerSpec;
+use crate::planners::{GuardedPlanner, PlannerMaker};
 use crate::record::{Summary, SummaryInputs};
 use output::OutputFolder;
 use progress::Progress;
@@ -68,6 +69,7 @@ impl LaunchArgs {
         }
         if let Some(planner) = &self.planner {
             mission.planner = planner.clone();
+            mission.planner.resolve(&std::env::current_dir()?);
         }
         if let Some(seed) = self.seed {
             mission.seed = seed;
@@ -85,7 +87,7 @@ impl LaunchArgs {
 /// # Errors
 /// When the mission is not valid, a node fails or never comes up, or an output cannot be written.
 #[expect(clippy::print_stdout, reason = "the summary is this command's result")]
-pub fn run(args: &LaunchArgs) -> Result<()> {
+pub fn run(args: &LaunchArgs, maker: PlannerMaker) -> Result<()> {
     let mission = args.mission()?;
     let requests = mission.initial_requests()?;
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
@@ -93,7 +95,7 @@ pub fn run(args: &LaunchArgs) -> Result<()> {
     // What is flown is what was written: nodes, in-process missions and re-flights read the same file.
     let mission = Mission::read(&mission_file)?;
     let summary = if args.in_process {
-        fly_in_process(&mission, &mut output)?
+        fly_in_process(&mission, &mut output, maker)?
     } else {
         over_dds::fly(&mission, &mission_file, &mut output, !args.no_bag)?
     };
@@ -106,16 +108,19 @@ pub fn run(args: &LaunchArgs) -> Result<()> {
     Ok(())
 }
 
-fn fly_in_process(mission: &Mission, output: &mut OutputFolder) -> Result<Summary> {
+fn fly_in_process(mission: &Mission, output: &mut OutputFolder, maker: PlannerMaker) -> Result<Summary> {
     let mut flight = InProcessMission::new(mission)?;
-    let mut planner = mission.planner.make(mission.seed);
+    let mut planner = GuardedPlanner::make(maker, &mission.planner, mission.seed);
+    if let Some(reason) = planner.missing() {
+        tracing::error!("no planner {}: {reason}; {} takes over", mission.planner, planner.name());
+    }
     let period = flight.model().period;
     let horizon = mission.horizon(flight.model());
     let mut totals = Totals::default();
     let mut progress = Progress::new(horizon, period);
     let started = Instant::now();
     let mut failed = None;
-    flight.run(planner.as_mut(), |record, line| {
+    flight.run(&mut planner, |record, line| {
         totals.add(record);
         progress.task(record.end, &totals);
         if let Err(error) = output.write_task(&line) {
@@ -128,7 +133,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder) -> Result<Summar
     }
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
-        planner: planner.name(),
+        planner: mission.planner.to_string(),
         seed: mission.seed,
         orbits: mission.orbits,
         ticks: horizon.0,

@@ -4,7 +4,9 @@ use swath_sim::catalogue::Candidate;
 use swath_sim::flight::Situation;
 use swath_sim::guidance::Task;
 use swath_sim::model::Model;
-use swath_sim::planner::{Decision, DecisionContext, Heuristic, Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, Rationale};
+
+use crate::planners::GuardedPlanner;
 
 /// The candidates of a task.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,33 +32,24 @@ pub struct Planned {
     pub planner: String,
     /// Why the planner itself did not decide and the heuristic took over.
     pub fault: Option<String>,
+    /// How it weighed the candidates.
+    pub rationale: Option<Rationale>,
 }
 
 /// The planner node's state.
 pub struct PlannerLogic {
     model: Model,
-    planner: Box<dyn Planner + Send>,
-    fallback: Heuristic,
+    planner: GuardedPlanner,
     point: Option<(u64, Situation)>,
     upcoming: Option<Upcoming>,
     decided: Option<u64>,
 }
 
-/// Transition of the heuristic that takes over from a planner that fails [s].
-const FALLBACK_T_PRE_S: f64 = 90.0;
-
 impl PlannerLogic {
     /// A planner node around a planner.
     #[must_use]
-    pub fn new(model: Model, planner: Box<dyn Planner + Send>) -> Self {
-        Self {
-            model,
-            planner,
-            fallback: Heuristic { t_pre_s: FALLBACK_T_PRE_S },
-            point: None,
-            upcoming: None,
-            decided: None,
-        }
+    pub fn new(model: Model, planner: GuardedPlanner) -> Self {
+        Self { model, planner, point: None, upcoming: None, decided: None }
     }
 
     /// A task is wanted.
@@ -85,17 +78,19 @@ impl PlannerLogic {
         }
         let context =
             DecisionContext { task, situation: &situation, candidates: &upcoming.candidates, model: &self.model };
-        let usable = |planner: &mut dyn Planner| {
-            let decision = planner.decide(&context)?;
-            Ok::<_, PlannerError>((decision, decision.to_task(&context)?))
-        };
-        let (decided, name, fault) = match usable(self.planner.as_mut()) {
-            Ok(decided) => (decided, self.planner.name(), None),
-            Err(error) => (usable(&mut self.fallback).ok()?, self.fallback.name(), Some(error.to_string())),
-        };
+        // The guarded planner's decisions are allowed ones: the heuristic waits when nothing else is left.
+        let decision = self.planner.decide(&context).ok()?;
+        let kind = decision.to_task(&context).ok()?;
         self.decided = Some(task);
-        let (decision, kind) = decided;
-        Some(Planned { task, situation, decision, kind, planner: name, fault })
+        Some(Planned {
+            task,
+            situation,
+            decision,
+            kind,
+            planner: self.planner.name(),
+            fault: self.planner.fault().map(str::to_owned),
+            rationale: self.planner.rationale(),
+        })
     }
 }
 
@@ -105,6 +100,7 @@ mod tests {
 
     use swath_sim::config::SimConfig;
     use swath_sim::env::{Env, EpisodeConfig};
+    use swath_sim::planner::{Heuristic, PlannerError};
 
     use super::*;
 
@@ -132,7 +128,8 @@ mod tests {
     fn it_decides_once_when_both_halves_are_there_in_either_order() {
         let env = env();
         let situation = *env.context().situation;
-        let make = || PlannerLogic::new((**env.model()).clone(), Box::new(Heuristic { t_pre_s: 90.0 }));
+        let make =
+            || PlannerLogic::new((**env.model()).clone(), GuardedPlanner::new(Box::new(Heuristic { t_pre_s: 90.0 })));
         let mut first = make();
         assert_eq!(first.on_decision_point(0, situation), None);
         let planned = first.on_upcoming(upcoming(&env, 0)).unwrap();
@@ -146,7 +143,7 @@ mod tests {
     #[test]
     fn the_heuristic_takes_over_from_a_planner_that_fails() {
         let env = env();
-        let mut logic = PlannerLogic::new((**env.model()).clone(), Box::new(Broken));
+        let mut logic = PlannerLogic::new((**env.model()).clone(), GuardedPlanner::new(Box::new(Broken)));
         logic.on_decision_point(0, *env.context().situation);
         let planned = logic.on_upcoming(upcoming(&env, 0)).unwrap();
         assert_eq!(planned.planner, "heuristic:90");

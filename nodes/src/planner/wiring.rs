@@ -6,10 +6,11 @@ use anyhow::Result;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::Spec;
 use swath_ros::{Publisher, Subscription, graph};
+use swath_sim::planner::{Planner, PlannerSpec};
 
 use super::logic::{Planned, PlannerLogic};
 use crate::node::{MissionNode, Severity};
-use crate::planners::PlannerSpec;
+use crate::planners::{GuardedPlanner, PlannerMaker};
 use crate::{from_msg, to_msg};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
@@ -19,8 +20,8 @@ const IDLE: Duration = Duration::from_millis(500);
 ///
 /// # Errors
 /// When the node cannot come up or DDS fails.
-pub fn run() -> Result<()> {
-    let mut node = PlannerNode::new(MissionNode::start(graph::PLANNER)?)?;
+pub fn run(maker: PlannerMaker) -> Result<()> {
+    let mut node = PlannerNode::new(MissionNode::start(graph::PLANNER)?, maker)?;
     while !node.base.shutdown.asked() {
         node.turn()?;
     }
@@ -39,12 +40,17 @@ struct PlannerNode {
 }
 
 impl PlannerNode {
-    fn new(base: MissionNode) -> Result<Self> {
+    fn new(base: MissionNode, maker: PlannerMaker) -> Result<Self> {
         let name = Spec::new("planner", base.mission.planner.to_string(), "As the mission file names planners.");
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
         base.node.parameters().check_given()?;
+        let planner = GuardedPlanner::make(maker, &spec, base.mission.seed);
+        if let Some(reason) = planner.missing() {
+            let text = format!("{reason}; {} takes over", planner.name());
+            base.alarm(Severity::Error, &format!("no planner {spec}"), &text)?;
+        }
         Ok(Self {
-            logic: PlannerLogic::new((*base.model).clone(), spec.make(base.mission.seed)),
+            logic: PlannerLogic::new((*base.model).clone(), planner),
             points: base.node.subscription(&graph::DECISION_POINT)?,
             upcoming: base.node.subscription(&graph::UPCOMING_STRIPS)?,
             tasks: base.node.publisher(&graph::PLANNER_TASK)?,

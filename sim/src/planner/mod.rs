@@ -3,10 +3,12 @@
 mod heuristic;
 mod lookahead;
 mod random;
+mod spec;
 
 pub use heuristic::Heuristic;
 pub use lookahead::Lookahead;
 pub use random::Random;
+pub use spec::{PlannerSpec, UnknownPlanner};
 
 use thiserror::Error;
 
@@ -95,6 +97,17 @@ impl Decision {
     }
 }
 
+/// What a planner that weighs its candidates says of a decision.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rationale {
+    /// Probability of each candidate, in their order; entries beyond the candidates are padding.
+    pub probabilities: Vec<f32>,
+    /// Expected return as the critic sees it.
+    pub value: f32,
+    /// SHA-256 of the policy, in hexadecimal.
+    pub policy: String,
+}
+
 /// A planner. The same context and the same planner state give the same decision.
 pub trait Planner {
     /// Name in tables and records, such as `heuristic:90`.
@@ -105,6 +118,11 @@ pub trait Planner {
     /// # Errors
     /// When no usable decision could be made.
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError>;
+
+    /// Why it decided as it last did; nothing from a planner that does not weigh candidates.
+    fn rationale(&self) -> Option<Rationale> {
+        None
+    }
 }
 
 /// How long to wait when there is no candidate at all [s].

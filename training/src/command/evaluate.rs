@@ -8,8 +8,9 @@ use clap::Args;
 use serde_json::{Value, json};
 use swath_sim::config::SimConfig;
 use swath_sim::env::EpisodeConfig;
+use swath_sim::planner::PlannerSpec;
 use swath_sim::scenario::ScenarioConfig;
-use swath_training::evaluate::{Mission, Missions, PlannerSpec, Spread, fly, spread, spread_of};
+use swath_training::evaluate::{Mission, Missions, Spread, fly, spread, spread_of};
 use swath_training::process;
 
 /// Which missions are flown.

@@ -1,0 +1,147 @@
+//! Planners by name.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{Heuristic, Lookahead, Planner, Random};
+
+/// Kinds of policies: hybrid ones with a transformer, with an MLP, standard hybrid PPO, and PPO over a grid.
+const KINDS: [&str; 4] = ["hop-ppo", "hop-ppo-mlp", "h-ppo", "discrete-ppo"];
+
+/// Largest margin of the lookahead planner [ticks].
+const MARGIN_MAX: u32 = 240;
+/// Longest fixed transition [s].
+const T_PRE_MAX_S: f64 = 600.0;
+
+/// A planner by name: `lookahead`, `lookahead:TICKS`, `heuristic:SECONDS`, `random`, or a kind of policy such as
+/// `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum PlannerSpec {
+    /// Flies each candidate in its head; the margin is added to each transition [ticks].
+    Lookahead(u32),
+    /// The paper's heuristic with a fixed transition time [s].
+    Heuristic(f64),
+    /// A uniform strip and a uniform transition time.
+    Random,
+    /// A trained policy.
+    Learned {
+        /// Kind of network that it must have.
+        kind: String,
+        /// Policy or checkpoint; none for the shipped one.
+        file: Option<PathBuf>,
+    },
+}
+
+/// A name that is no planner's.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("`{name}` is no planner: {reason}")]
+pub struct UnknownPlanner {
+    name: String,
+    reason: &'static str,
+}
+
+impl Default for PlannerSpec {
+    fn default() -> Self {
+        Self::Lookahead(0)
+    }
+}
+
+impl FromStr for PlannerSpec {
+    type Err = UnknownPlanner;
+
+    fn from_str(name: &str) -> Result<Self, UnknownPlanner> {
+        let unknown = |reason| UnknownPlanner { name: name.to_owned(), reason };
+        let (word, rest) = name.split_once(':').map_or((name, None), |(word, rest)| (word, Some(rest)));
+        match (word, rest) {
+            ("random", None) => Ok(Self::Random),
+            ("lookahead", None) => Ok(Self::Lookahead(0)),
+            ("lookahead", Some(ticks)) => match ticks.parse() {
+                Ok(margin) if margin <= MARGIN_MAX => Ok(Self::Lookahead(margin)),
+                _ => Err(unknown("the margin must be a whole number of ticks from 0 to 240")),
+            },
+            ("heuristic", Some(seconds)) => match seconds.parse() {
+                Ok(t_pre_s) if (0.0..=T_PRE_MAX_S).contains(&t_pre_s) => Ok(Self::Heuristic(t_pre_s)),
+                _ => Err(unknown("the transition time must be a number of seconds from 0 to 600")),
+            },
+            _ => {
+                let kind = KINDS.into_iter().find(|kind| *kind == word);
+                let kind = kind.ok_or_else(|| {
+                    unknown(
+                        "expected lookahead[:TICKS], heuristic:SECONDS, random, or \
+                         hop-ppo, hop-ppo-mlp, h-ppo or discrete-ppo with :FILE for a policy that is not shipped",
+                    )
+                })?;
+                Ok(Self::Learned { kind: kind.to_owned(), file: rest.map(PathBuf::from) })
+            }
+        }
+    }
+}
+
+impl TryFrom<String> for PlannerSpec {
+    type Error = UnknownPlanner;
+
+    fn try_from(name: String) -> Result<Self, UnknownPlanner> {
+        name.parse()
+    }
+}
+
+impl From<PlannerSpec> for String {
+    fn from(spec: PlannerSpec) -> Self {
+        spec.to_string()
+    }
+}
+
+impl fmt::Display for PlannerSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lookahead(0) => write!(f, "lookahead"),
+            Self::Lookahead(margin) => write!(f, "lookahead:{margin}"),
+            Self::Heuristic(t_pre_s) => write!(f, "heuristic:{t_pre_s}"),
+            Self::Random => write!(f, "random"),
+            Self::Learned { kind, file: None } => write!(f, "{kind}"),
+            Self::Learned { kind, file: Some(file) } => write!(f, "{kind}:{}", file.display()),
+        }
+    }
+}
+
+impl PlannerSpec {
+    /// Makes the planner for a mission of this seed; none for a policy, which this crate knows nothing of.
+    #[must_use]
+    pub fn hand_written(&self, seed: u64) -> Option<Box<dyn Planner + Send>> {
+        match *self {
+            Self::Lookahead(margin) => Some(Box::new(Lookahead { margin })),
+            Self::Heuristic(t_pre_s) => Some(Box::new(Heuristic { t_pre_s })),
+            Self::Random => Some(Box::new(Random { seed })),
+            Self::Learned { .. } => None,
+        }
+    }
+
+    /// Puts a policy's file into `folder` where its path is relative.
+    pub fn resolve(&mut self, folder: &Path) {
+        if let Self::Learned { file: Some(file), .. } = self {
+            *file = folder.join(&*file);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip_and_faults_are_told() {
+        for name in ["lookahead", "lookahead:4", "heuristic:90", "heuristic:72.5", "random", "h-ppo:a:b", "hop-ppo"] {
+            assert_eq!(name.parse::<PlannerSpec>().unwrap().to_string(), name);
+        }
+        for name in
+            ["heuristic:nan", "heuristic:-1", "heuristic:601", "lookahead:-1", "clever", "random:3", "heuristic"]
+        {
+            assert!(name.parse::<PlannerSpec>().unwrap_err().to_string().contains(name));
+        }
+    }
+}
