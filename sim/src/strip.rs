@@ -49,6 +49,8 @@ pub struct Strip {
     pub priority: f64,
 }
 
+/// Ends of twins differ by no more than rounding [rad].
+const TWIN_TOLERANCE: f64 = 1e-9;
 /// Strips whose ends are this close to opposite have no defined great circle [rad].
 const ANTIPODAL_MARGIN: f64 = 1e-6;
 
@@ -141,6 +143,14 @@ impl StripRequest {
 }
 
 impl Strip {
+    /// Whether this is the other strip scanned backward, as bidirectional requests make them.
+    #[must_use]
+    pub fn is_twin_of(&self, other: &Self) -> bool {
+        let end_E = |strip: &Self| strip.start_E * libm::cos(strip.arc) + strip.along_E * libm::sin(strip.arc);
+        let same = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm_squared() < TWIN_TOLERANCE * TWIN_TOLERANCE;
+        same(self.start_E, end_E(other)) && same(end_E(self), other.start_E)
+    }
+
     /// Time T_acq to image the strip [s].
     #[must_use]
     pub fn acquisition_time_s(&self) -> f64 {
@@ -218,5 +228,22 @@ mod tests {
         assert_eq!(code(|r| r.end_latitude_deg = 60.0), 105);
         assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (-10.0, 200.0)), 111);
         assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (10.0, 20.0)), 105);
+    }
+
+    #[test]
+    fn a_reversed_strip_is_a_twin_and_no_other_is() {
+        let limits = RequestLimits::default();
+        let request = StripRequest {
+            start_latitude_deg: 10.0,
+            start_longitude_deg: 20.0,
+            end_latitude_deg: 11.0,
+            end_longitude_deg: 22.0,
+            acquisition_speed_m_s: 3000.0,
+            priority: 0.5,
+            bidirectional: true,
+        };
+        let strip = request.to_strip(&limits, 6_378_136.6).unwrap();
+        let twin = request.reversed().to_strip(&limits, 6_378_136.6).unwrap();
+        assert!(strip.is_twin_of(&twin) && twin.is_twin_of(&strip) && !strip.is_twin_of(&strip));
     }
 }

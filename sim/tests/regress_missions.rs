@@ -7,7 +7,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
 use swath_sim::model::Model;
 use swath_sim::observation::ObservationSet;
-use swath_sim::planner::{Decision, Heuristic, Lookahead, Planner, Random};
+use swath_sim::planner::{Beam, Decision, Heuristic, Lookahead, Planner, Random};
 
 fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<TaskRecord> {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());
@@ -89,4 +89,28 @@ fn observations_are_finite_near_unit_size_and_masked() {
         }
         env.step(Decision::Image { candidate: 0, t_pre: 100 }).unwrap();
     }
+}
+
+#[test]
+fn the_beam_beats_the_greedy_lookahead_and_never_fails() {
+    let (mut beam, mut lookahead) = (Totals::default(), Totals::default());
+    for seed in 0..4 {
+        for record in fly(&mut Beam::default(), seed) {
+            beam.add(&record);
+        }
+        for record in fly(&mut Lookahead::default(), seed) {
+            lookahead.add(&record);
+        }
+    }
+    assert_eq!((beam.failed_attitude, beam.failed_elevation), (0, 0));
+    assert!(beam.reward > lookahead.reward, "{beam:?} {lookahead:?}");
+}
+
+#[test]
+fn a_beam_without_a_budget_still_decides() {
+    let mut totals = Totals::default();
+    for record in fly(&mut Beam { budget: 0, ..Beam::default() }, 1) {
+        totals.add(&record);
+    }
+    assert!(totals.fulfilled > 60 && totals.failed_attitude == 0, "{totals:?}");
 }

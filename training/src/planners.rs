@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use swath_sim::planner::{Planner, PlannerSpec};
 
 use crate::error::{Result, TrainingError};
+use crate::lookahead::PolicyLookahead;
 use crate::policy::{LearnedPlanner, Policy};
 
 /// Policies that are part of the program.
@@ -15,8 +16,13 @@ const SHIPPED: [(&str, &[u8]); 1] = [("hop-ppo", include_bytes!("../policies/hop
 /// # Errors
 /// A policy that is not shipped, cannot be read, is damaged or is of another kind.
 pub fn make(spec: &PlannerSpec, seed: u64) -> Result<Box<dyn Planner + Send>> {
-    if let PlannerSpec::Learned { kind, file } = spec {
-        return Ok(Box::new(LearnedPlanner::new(policy(kind, file.as_deref())?)));
+    if let PlannerSpec::Learned { kind, file, lookahead } = spec {
+        let policy = policy(kind, file.as_deref())?;
+        return Ok(if *lookahead {
+            Box::new(PolicyLookahead::new(policy))
+        } else {
+            Box::new(LearnedPlanner::new(policy))
+        });
     }
     let planner = spec.hand_written(seed);
     planner.ok_or_else(|| TrainingError::Environment(format!("{spec} cannot be made")))

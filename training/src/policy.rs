@@ -144,6 +144,24 @@ impl Policy {
         Ok(Judgement { probabilities: self.token_probabilities(&logits), value, action: Action { token, parameter } })
     }
 
+    /// The critic's values of several observations, one after the other in `features` and `valid`.
+    ///
+    /// # Errors
+    /// Observations of another shape, and values that are not finite.
+    pub fn values(&self, features: &[f32], valid: &[bool]) -> Result<Vec<f32>> {
+        let shape = self.network.shape();
+        if features.len() * shape.tokens != valid.len() * shape.len() || !valid.len().is_multiple_of(shape.tokens) {
+            let found = format!("{} numbers for {} tokens", features.len(), valid.len());
+            return Err(TrainingError::Shape {
+                wanted: format!("{} × {} numbers each", shape.tokens, shape.features),
+                found,
+            });
+        }
+        let _guard = tch::no_grad_guard();
+        let seen = observations(features, valid, shape, Device::Cpu);
+        finite(to_vec(&self.network.assess(&self.parameters, &seen).value)?, "value")
+    }
+
     /// Softmax of the logits, summed over the choices of each token.
     fn token_probabilities(&self, logits: &[f32]) -> Vec<f32> {
         let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -178,6 +196,23 @@ impl LearnedPlanner {
         &self.policy
     }
 
+    /// What the policy says of a situation with at least one candidate.
+    ///
+    /// # Errors
+    /// As [`Policy::judge`], and a mission with more candidates or another longest transition than in training.
+    pub fn consider(&mut self, context: &DecisionContext<'_>) -> Result<Judgement> {
+        let (count, slots) = (context.candidates.len(), self.valid.len());
+        let longest_s = context.model.config.planning.t_pre_max_s;
+        if count > slots || longest_s != self.policy.longest_s {
+            return Err(TrainingError::Shape {
+                wanted: format!("at most {slots} candidates and {} s", self.policy.longest_s),
+                found: format!("{count} candidates and {longest_s} s"),
+            });
+        }
+        observe(context, self.policy.set, &mut self.features, &mut self.valid);
+        self.policy.judge(&self.features, &self.valid)
+    }
+
     /// What the policy said at the last decision; none before the first and after a wait.
     pub fn judgement(&self) -> Option<&Judgement> {
         self.judgement.as_ref()
@@ -200,21 +235,11 @@ impl Planner for LearnedPlanner {
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {
         self.judgement = None;
-        let failed = |error: TrainingError| PlannerError::Policy(error.to_string());
-        let (count, slots) = (context.candidates.len(), self.valid.len());
-        let longest_s = context.model.config.planning.t_pre_max_s;
-        if count > slots || longest_s != self.policy.longest_s {
-            return Err(failed(TrainingError::Shape {
-                wanted: format!("at most {slots} candidates and {} s", self.policy.longest_s),
-                found: format!("{count} candidates and {longest_s} s"),
-            }));
-        }
-        if count == 0 {
+        if context.candidates.is_empty() {
             let ticks = context.model.period.ticks_ceil(crate::strips::WAIT_S).max(1);
             return Ok(Decision::Wait { ticks });
         }
-        observe(context, self.policy.set, &mut self.features, &mut self.valid);
-        let judgement = self.policy.judge(&self.features, &self.valid).map_err(failed)?;
+        let judgement = self.consider(context).map_err(|error| PlannerError::Policy(error.to_string()))?;
         let action = judgement.action;
         self.judgement = Some(judgement);
         Ok(decision(context.model, action))

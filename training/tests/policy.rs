@@ -5,7 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use swath_sim::env::{Env, EpisodeConfig};
+use swath_sim::config::SimConfig;
+use swath_sim::env::{Env, EpisodeConfig, Totals};
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Planner};
 use swath_training::TrainingError;
@@ -14,6 +15,7 @@ use swath_training::config::{EnvironmentConfig, RunConfig};
 use swath_training::distribution::{best_choice, squash};
 use swath_training::environment::{Action, Environment};
 use swath_training::network::Observations;
+use swath_training::planners;
 use swath_training::policy::{LearnedPlanner, Policy};
 use swath_training::rollout::{observations, to_vec};
 use swath_training::store::Content;
@@ -156,4 +158,20 @@ fn every_shipped_configuration_is_valid_and_every_compact_policy_is_small() {
         }
     }
     assert!(count >= 14);
+}
+
+#[test]
+fn a_policy_whose_proposals_are_flown_in_the_head_never_fails_and_earns_more() {
+    let model = Arc::new(Model::new(SimConfig::default()).unwrap());
+    let episode = EpisodeConfig { orbits: 2.0, ..EpisodeConfig::evaluation() };
+    let fly = |name: &str| {
+        let mut planner = planners::make(&name.parse().unwrap(), 0).unwrap();
+        let mut totals = Totals::default();
+        let mut env = Env::episode(model.clone(), &episode, 3);
+        env.run(planner.as_mut(), |record| totals.add(record)).unwrap();
+        totals
+    };
+    let (alone, in_head) = (fly("hop-ppo"), fly("hop-ppo+lookahead"));
+    assert_eq!((in_head.failed_attitude, in_head.failed_elevation), (0, 0));
+    assert!(in_head.reward > alone.reward, "{in_head:?} {alone:?}");
 }

@@ -7,23 +7,29 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Heuristic, Lookahead, Planner, Random};
+use super::{Beam, Heuristic, Lookahead, Planner, Random};
 
 /// Kinds of policies: hybrid ones with a transformer, with an MLP, standard hybrid PPO, and PPO over a grid.
 const KINDS: [&str; 4] = ["hop-ppo", "hop-ppo-mlp", "h-ppo", "discrete-ppo"];
+
+/// What follows a kind of policy whose proposals are flown in the head.
+const LOOKAHEAD: &str = "+lookahead";
 
 /// Largest margin of the lookahead planner [ticks].
 const MARGIN_MAX: u32 = 240;
 /// Longest fixed transition [s].
 const T_PRE_MAX_S: f64 = 600.0;
 
-/// A planner by name: `lookahead`, `lookahead:TICKS`, `heuristic:SECONDS`, `random`, or a kind of policy such as
-/// `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another.
+/// A planner by name: `lookahead`, `lookahead:TICKS`, `beam`, `beam:WIDTHxDEPTH`, `heuristic:SECONDS`, `random`, or a
+/// kind of policy such as `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another; with
+/// `hop-ppo+lookahead` its proposals are flown in the head.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum PlannerSpec {
     /// Flies each candidate in its head; the margin is added to each transition [ticks].
     Lookahead(u32),
+    /// Flies sequences of candidates in its head.
+    Beam(Beam),
     /// The paper's heuristic with a fixed transition time [s].
     Heuristic(f64),
     /// A uniform strip and a uniform transition time.
@@ -34,6 +40,8 @@ pub enum PlannerSpec {
         kind: String,
         /// Policy or checkpoint; none for the shipped one.
         file: Option<PathBuf>,
+        /// Whether the strips that it proposes are flown in the head before one is chosen.
+        lookahead: bool,
     },
 }
 
@@ -64,22 +72,34 @@ impl FromStr for PlannerSpec {
                 Ok(margin) if margin <= MARGIN_MAX => Ok(Self::Lookahead(margin)),
                 _ => Err(unknown("the margin must be a whole number of ticks from 0 to 240")),
             },
+            ("beam", None) => Ok(Self::Beam(Beam::default())),
+            ("beam", Some(shape)) => beam(shape)
+                .ok_or_else(|| unknown("the beam must be WIDTHxDEPTH, with a width of 1 to 64 and a depth of 1 to 8")),
             ("heuristic", Some(seconds)) => match seconds.parse() {
                 Ok(t_pre_s) if (0.0..=T_PRE_MAX_S).contains(&t_pre_s) => Ok(Self::Heuristic(t_pre_s)),
                 _ => Err(unknown("the transition time must be a number of seconds from 0 to 600")),
             },
             _ => {
+                let (word, lookahead) = word.strip_suffix(LOOKAHEAD).map_or((word, false), |kind| (kind, true));
                 let kind = KINDS.into_iter().find(|kind| *kind == word);
                 let kind = kind.ok_or_else(|| {
                     unknown(
-                        "expected lookahead[:TICKS], heuristic:SECONDS, random, or \
-                         hop-ppo, hop-ppo-mlp, h-ppo or discrete-ppo with :FILE for a policy that is not shipped",
+                        "expected lookahead[:TICKS], beam[:WIDTHxDEPTH], heuristic:SECONDS, random, or hop-ppo, hop-ppo-mlp, \
+                         h-ppo or discrete-ppo, then +lookahead to fly its proposals in the head, and :FILE for a \
+                         policy that is not shipped",
                     )
                 })?;
-                Ok(Self::Learned { kind: kind.to_owned(), file: rest.map(PathBuf::from) })
+                Ok(Self::Learned { kind: kind.to_owned(), file: rest.map(PathBuf::from), lookahead })
             }
         }
     }
+}
+
+fn beam(shape: &str) -> Option<PlannerSpec> {
+    let (width, depth) = shape.split_once('x')?;
+    let (width, depth) = (width.parse().ok()?, depth.parse().ok()?);
+    let fits = (1..=64).contains(&width) && (1..=8).contains(&depth);
+    fits.then(|| PlannerSpec::Beam(Beam { width, depth, ..Beam::default() }))
 }
 
 impl TryFrom<String> for PlannerSpec {
@@ -101,10 +121,14 @@ impl fmt::Display for PlannerSpec {
         match self {
             Self::Lookahead(0) => write!(f, "lookahead"),
             Self::Lookahead(margin) => write!(f, "lookahead:{margin}"),
+            Self::Beam(beam) if *beam == Beam::default() => write!(f, "beam"),
+            Self::Beam(beam) => write!(f, "beam:{}x{}", beam.width, beam.depth),
             Self::Heuristic(t_pre_s) => write!(f, "heuristic:{t_pre_s}"),
             Self::Random => write!(f, "random"),
-            Self::Learned { kind, file: None } => write!(f, "{kind}"),
-            Self::Learned { kind, file: Some(file) } => write!(f, "{kind}:{}", file.display()),
+            Self::Learned { kind, file, lookahead } => {
+                write!(f, "{kind}{}", if *lookahead { LOOKAHEAD } else { "" })?;
+                file.as_ref().map_or(Ok(()), |file| write!(f, ":{}", file.display()))
+            }
         }
     }
 }
@@ -115,6 +139,7 @@ impl PlannerSpec {
     pub fn hand_written(&self, seed: u64) -> Option<Box<dyn Planner + Send>> {
         match *self {
             Self::Lookahead(margin) => Some(Box::new(Lookahead { margin })),
+            Self::Beam(beam) => Some(Box::new(beam)),
             Self::Heuristic(t_pre_s) => Some(Box::new(Heuristic { t_pre_s })),
             Self::Random => Some(Box::new(Random { seed })),
             Self::Learned { .. } => None,
@@ -135,12 +160,31 @@ mod tests {
 
     #[test]
     fn names_round_trip_and_faults_are_told() {
-        for name in ["lookahead", "lookahead:4", "heuristic:90", "heuristic:72.5", "random", "h-ppo:a:b", "hop-ppo"] {
+        for name in [
+            "lookahead",
+            "lookahead:4",
+            "heuristic:90",
+            "heuristic:72.5",
+            "random",
+            "h-ppo:a:b",
+            "hop-ppo",
+            "beam",
+            "beam:4x2",
+            "hop-ppo+lookahead:a",
+        ] {
             assert_eq!(name.parse::<PlannerSpec>().unwrap().to_string(), name);
         }
-        for name in
-            ["heuristic:nan", "heuristic:-1", "heuristic:601", "lookahead:-1", "clever", "random:3", "heuristic"]
-        {
+        for name in [
+            "heuristic:nan",
+            "heuristic:-1",
+            "heuristic:601",
+            "lookahead:-1",
+            "clever",
+            "random:3",
+            "heuristic",
+            "beam:0x2",
+            "beam:4",
+        ] {
             assert!(name.parse::<PlannerSpec>().unwrap_err().to_string().contains(name));
         }
     }
