@@ -36,6 +36,8 @@ struct PlannerNode {
     decisions: Publisher<msg::Decision>,
     strips: Vec<msg::Candidate>,
     last: Option<msg::ImagingTask>,
+    /// Alarm to raise at the first decision point: before, nobody may be listening yet.
+    missing: Option<(String, String)>,
     base: MissionNode,
 }
 
@@ -45,10 +47,9 @@ impl PlannerNode {
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(maker, &spec, base.mission.seed);
-        if let Some(reason) = planner.missing() {
-            let text = format!("{reason}; {} takes over", planner.name());
-            base.alarm(Severity::Error, &format!("no planner {spec}"), &text)?;
-        }
+        let missing = planner
+            .missing()
+            .map(|reason| (format!("no planner {spec}"), format!("{reason}; {} takes over", planner.name())));
         Ok(Self {
             logic: PlannerLogic::new((*base.model).clone(), planner),
             points: base.node.subscription(&graph::DECISION_POINT)?,
@@ -57,6 +58,7 @@ impl PlannerNode {
             decisions: base.node.publisher(&graph::PLANNER_DECISION)?,
             strips: Vec::new(),
             last: None,
+            missing,
             base,
         })
     }
@@ -65,6 +67,9 @@ impl PlannerNode {
         while let Some(point) = self.points.take()? {
             if point.mission_over {
                 continue;
+            }
+            if let Some((name, text)) = self.missing.take() {
+                self.base.alarm(Severity::Error, &name, &text)?;
             }
             // The question again: the answer may have been lost.
             if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task) {
