@@ -1,9 +1,11 @@
-//! Measures writing, reading and recording; prints one JSON object.
+//! Measures writing, reading, recording and playing; prints one JSON object.
 //!
-//! Recording takes two further processes: `bench_json record DIR` and `bench_json publish RATE N`.
+//! Recording takes two further processes: `bench_json record DIR` and `bench_json publish RATE N`;
+//! playing, alone with `bench_json play`, takes `bench_json play BAG RATE` and `bench_json listen N`.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
 
 use std::{
+    collections::BTreeMap,
     env,
     io::{BufRead, BufReader},
     path::Path,
@@ -14,6 +16,7 @@ use std::{
 use serde_json::{Value, json};
 use swath_bags::{
     Bag, BagOptions, BagWriter, Compression, Filter, Topic, TopicPattern,
+    play::{PlayOptions, Player},
     qos::QosProfile,
     record::{RecordOptions, Recorder},
 };
@@ -28,6 +31,8 @@ const TYPE: &str = "std_msgs/msg/String";
 const MESSAGE_BYTES: usize = 300;
 const RECORDED: u64 = 1_000_000;
 const RATE: u64 = 50_000;
+/// Messages that are played at their own pace, a thousand a second.
+const PACED: u64 = 10_000;
 /// A domain of its own, so that nothing else is recorded.
 const DOMAIN: &str = "139";
 
@@ -36,9 +41,16 @@ fn main() {
     let args: Vec<&str> = args.iter().map(String::as_str).collect();
     let result = match args[..] {
         [] => measure(),
+        ["play"] => {
+            let temp = tempfile::tempdir().unwrap();
+            let messages: Vec<_> = (0..1024).map(message).collect();
+            measure_playing(temp.path(), &messages)
+        }
         ["record", dir] => record(Path::new(dir)),
         ["publish", rate, n] => publish(rate.parse().unwrap(), n.parse().unwrap()),
-        _ => panic!("usage: bench_json [record DIR | publish RATE N]"),
+        ["play", bag, rate] => play(Path::new(bag), rate.parse().unwrap()),
+        ["listen", n] => listen(n.parse().unwrap()),
+        _ => panic!("usage: bench_json [record DIR | publish RATE N | play [BAG RATE] | listen N]"),
     };
     println!("{result}");
 }
@@ -59,26 +71,46 @@ fn message(n: u64) -> Vec<u8> {
 fn measure() -> Value {
     let temp = tempfile::tempdir().unwrap();
     let messages: Vec<_> = (0..1024).map(message).collect();
-    let none = write(&temp.path().join("none"), Compression::None, &messages);
+    let none = write(&temp.path().join("none"), Compression::None, &messages, 1_000_000, 1);
     let zstd_dir = temp.path().join("zstd");
-    let zstd = write(&zstd_dir, Compression::Zstd, &messages);
+    let zstd = write(&zstd_dir, Compression::Zstd, &messages, 1_000_000, 1);
     let read = read(&zstd_dir);
     let mut result = record_over_dds(&temp.path().join("recorded"));
     result["bag_write_MB_per_s"] = json!(none.round());
     result["bag_write_zstd_MB_per_s"] = json!(zstd.round());
     result["bag_read_msgs_per_s"] = json!(read.round());
+    if let (Value::Object(all), Value::Object(played)) = (&mut result, measure_playing(temp.path(), &messages)) {
+        all.extend(played);
+    }
     result
 }
 
-/// Writes a million messages; MB/s of message bytes, the end included.
-fn write(dir: &Path, compression: Compression, messages: &[Vec<u8>]) -> f64 {
+/// A million messages as fast as they go, and a thousand a second at their own pace.
+fn measure_playing(dir: &Path, messages: &[Vec<u8>]) -> Value {
+    let (fast, paced) = (dir.join("fast"), dir.join("paced"));
+    write(&fast, Compression::Zstd, messages, 1_000_000, 1);
+    write(&paced, Compression::Zstd, messages, PACED, 1_000_000);
+    let (player, listener) = play_over_dds(&fast, 0.0, 1_000_000);
+    let (in_time, received) = play_over_dds(&paced, 1.0, PACED);
+    json!({
+        "play_msgs_per_s": listener["msgs_per_s"],
+        "play_lost": listener["lost"],
+        "play_cpu_s": player["cpu_s"],
+        "play_listener_cpu_s": listener["cpu_s"],
+        "play_late_p99_ms": in_time["late_p99_ms"],
+        "play_received_late_p99_ms": received["late_p99_ms"],
+    })
+}
+
+/// Writes messages some time apart; MB/s of message bytes, the end included.
+fn write(dir: &Path, compression: Compression, messages: &[Vec<u8>], count: u64, step_ns: u64) -> f64 {
     let start = Instant::now();
     let bag = BagWriter::create(dir, BagOptions { compression, ..BagOptions::default() }).unwrap();
     let known = Interface::find(TYPE).unwrap();
-    let topic = Topic::new(TOPIC, TYPE, known.schema, known.type_hash, vec![QosProfile::reliable(1)]);
+    let topic = Topic::new(TOPIC, TYPE, known.schema, known.type_hash, vec![QosProfile::reliable(4096)]);
     let topic = bag.add_topic(&topic.unwrap()).unwrap();
-    for n in 0..1_000_000u64 {
-        bag.write(topic, n, n, &messages[n as usize % messages.len()]).unwrap();
+    for n in 0..count {
+        bag.write(topic, n * step_ns, n * step_ns, &messages[n as usize % messages.len()]).unwrap();
     }
     let summary = bag.close().unwrap();
     summary.messages as f64 * MESSAGE_BYTES as f64 / 1e6 / start.elapsed().as_secs_f64()
@@ -113,6 +145,17 @@ fn record_over_dds(dir: &Path) -> Value {
         "record_memory_MB": recorded["memory_MB"],
         "record_cpu_s": recorded["cpu_s"],
     })
+}
+
+/// A player and a listener, each in its process; what both say.
+fn play_over_dds(bag: &Path, rate: f64, messages: u64) -> (Value, Value) {
+    let role = |args: &[&str]| {
+        let mut command = Command::new(env::current_exe().unwrap());
+        command.args(args).env("ROS_DOMAIN_ID", DOMAIN).stdout(Stdio::piped()).spawn().unwrap()
+    };
+    let listener = role(&["listen", &messages.to_string()]);
+    let player = role(&["play", bag.to_str().unwrap(), &rate.to_string()]);
+    (last_line(player), last_line(listener))
 }
 
 fn last_line(child: std::process::Child) -> Value {
@@ -177,6 +220,59 @@ fn publish(rate: u64, n: u64) -> Value {
     publisher.flush(Duration::from_secs(10));
     std::thread::sleep(Duration::from_secs(1));
     json!({ "seconds": seconds })
+}
+
+/// Plays a bag two seconds after the node is up.
+fn play(bag: &Path, rate: f64) -> Value {
+    let options = PlayOptions {
+        bags: vec![bag.to_owned()],
+        topics: TopicPattern::default(),
+        rate,
+        repeat: false,
+        start_offset: 0,
+        end_offset: None,
+        delay: Duration::from_secs(2),
+        paused: false,
+        clock_hz: None,
+        remap: BTreeMap::new(),
+        qos_overrides: BTreeMap::new(),
+        keys: false,
+    };
+    let player = Player::start(options, &RosArgs::default()).unwrap();
+    let summary = player.run(&Shutdown::default(), |_| ()).unwrap();
+    json!({ "published": summary.published, "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3, "cpu_s": cpu_s() })
+}
+
+/// Takes messages until none has come for ten seconds: how many a second, how many were lost, and how much later than the
+/// quickest 99 % of them came, were they a millisecond apart.
+fn listen(n: u64) -> Value {
+    let (_, args) = RosArgs::split(["--ros-args", "-r", "__node:=bench_listener"].map(str::to_owned)).unwrap();
+    let node = Node::start("operator", &args).unwrap();
+    let qos = RosProfile::subscription_default()
+        .reliability_reliable(WhenFull::Wait(Duration::from_secs(10)))
+        .history(History::KeepLast { depth: 65_536 });
+    let subscription = node.raw_subscription(TOPIC, TYPE, &qos).unwrap();
+    let mut times = Vec::new();
+    let mut last = Instant::now();
+    while (times.is_empty() || last.elapsed() < Duration::from_secs(10)) && (times.len() as u64) < n {
+        while let Some(sample) = subscription.take().unwrap() {
+            times.push(sample.info.received_time_ns);
+            last = Instant::now();
+        }
+        node.wait(Duration::from_millis(100)).unwrap();
+        // A wake-up serves many messages, as in the recorder.
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let span = (times[times.len() - 1] - times[0]) as f64 / 1e9;
+    let mut late: Vec<i64> = (0..).zip(&times).map(|(k, time)| time.cast_signed() - k * 1_000_000).collect();
+    late.sort_unstable();
+    let late_p99 = late[late.len() * 99 / 100] - late[0];
+    json!({
+        "msgs_per_s": (times.len() as f64 / span).round(),
+        "lost": n - times.len() as u64,
+        "late_p99_ms": late_p99 as f64 / 1e6,
+        "cpu_s": cpu_s(),
+    })
 }
 
 /// Largest resident set of this process [MB].

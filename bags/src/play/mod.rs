@@ -16,7 +16,7 @@ use swath_ros::{Node, RosArgs, Shutdown, graph};
 
 use self::{
     control::{Control, follow_key},
-    engine::{ClockPublisher, Engine},
+    engine::{ClockPublisher, Engine, TopicPublisher},
     keys::Keys,
     pace::Pace,
 };
@@ -33,6 +33,8 @@ const CLOCK: &str = "/clock";
 const CHORES: Duration = Duration::from_millis(20);
 /// Messages that are played at a time when nothing has to be waited for.
 const TURN: usize = 256;
+/// Least number of samples that a publisher of a topic that is not latched can send again.
+const LEAST_DEPTH: u64 = 1024;
 /// How long readers may take to acknowledge the last messages [wall time].
 const LAST_MESSAGES: Duration = Duration::from_secs(5);
 /// How long the publishers stay after that: RustDDS drops what a reader has not yet taken when its
@@ -200,7 +202,7 @@ impl Player {
     }
 
     /// A publisher for each topic that is played.
-    fn publishers(&self, bag: &Bag) -> Result<Vec<Option<swath_ros::RawPublisher>>> {
+    fn publishers(&self, bag: &Bag) -> Result<Vec<Option<TopicPublisher>>> {
         let known: BTreeSet<&str> = bag.topics().iter().map(|t| t.topic.name.as_str()).collect();
         if let Some(unknown) = self.options.qos_overrides.keys().find(|name| !known.contains(name.as_str())) {
             let reason = format!("the bag has no topic {unknown}");
@@ -209,7 +211,7 @@ impl Player {
         bag.topics().iter().map(|topic| self.publisher(topic)).collect()
     }
 
-    fn publisher(&self, topic: &BagTopic) -> Result<Option<swath_ros::RawPublisher>> {
+    fn publisher(&self, topic: &BagTopic) -> Result<Option<TopicPublisher>> {
         let name = &topic.topic.name;
         let own_clock = self.options.clock_hz.is_some() && name == CLOCK;
         if !self.options.topics.selects(name) || own_clock {
@@ -219,13 +221,20 @@ impl Player {
             tracing::warn!("{name} is not played: its encoding {:?} is not cdr", topic.topic.message_encoding);
             return Ok(None);
         }
-        let mut qos = topic.topic.qos.first().copied().unwrap_or(QosProfile::reliable(10));
+        let mut qos = topic.topic.qos.first().copied().unwrap_or(QosProfile::reliable(LEAST_DEPTH));
+        if qos.durability != Durability::TransientLocal {
+            // Readers do not see it; a recorder does not learn the depth of others.
+            qos.depth = qos.depth.max(LEAST_DEPTH);
+        }
         if let Some(change) = self.options.qos_overrides.get(name) {
             qos = change.apply(qos);
         }
         let renamed = self.options.remap.get(name).unwrap_or(name);
         match self.node.raw_publisher(renamed, &topic.topic.type_name, &to_ros(&qos)) {
-            Ok(publisher) => Ok(Some(publisher)),
+            Ok(publisher) => {
+                let depth = qos.depth.max(1) as usize;
+                Ok(Some(TopicPublisher { publisher, depth, unacknowledged: 0 }))
+            }
             Err(error) => {
                 tracing::warn!("{name} is not played: {}", chain(&error));
                 Ok(None)
