@@ -156,7 +156,8 @@ fn requests_of_a_mission_in_flight_come_at_the_same_decisions_again() {
     }
     let requests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/requests");
     for file in ["coasts.geojson", "rivers.geojson"] {
-        common::succeed(common::command("swath", &domain).args(["strips", "submit"]).arg(requests.join(file)));
+        // Some may be refused: the mission flies on, and a strip's last window may have passed.
+        common::command("swath", &domain).args(["strips", "submit"]).arg(requests.join(file)).status().unwrap();
     }
     assert!(launch.wait().unwrap().success());
     let bag = out.join("bag");

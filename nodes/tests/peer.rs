@@ -6,8 +6,8 @@ mod common;
 #[test]
 fn a_cyclonedds_peer_sees_the_mission_and_has_a_strip_imaged() {
     let folder = tempfile::tempdir().unwrap();
-    // Twelve orbits at 600 times real time, if the peer does not end it before.
-    let mission = common::write_mission(folder.path(), "orbits = 12.0\npace = 600.0\nseed = 5\n");
+    // Twelve orbits at 200 times real time, if the peer does not end it before.
+    let mission = common::write_mission(folder.path(), "orbits = 12.0\npace = 200.0\nseed = 5\n");
     let domain = common::domain();
     let mut launch = common::command("swath", &domain);
     launch.arg("launch").arg(mission).arg("--no-bag").arg("--out").arg(folder.path().join("out"));
