@@ -103,6 +103,10 @@ impl Control {
             tracing::warn!("no last diagnostics: {error}");
         }
         self.diagnostics.flush(Duration::from_millis(500));
+        if level != DiagnosticStatus::OK {
+            // A reader may drop what it has not taken yet when the writer leaves.
+            std::thread::sleep(Duration::from_millis(500));
+        }
     }
 
     fn send(&self, level: u8, message: String, values: &[(&str, String)], stamp: Time) -> Result<(), RosError> {
