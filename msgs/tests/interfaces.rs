@@ -42,7 +42,9 @@ fn type_hashes_are_those_of_ros_2() {
         // Ours, as PyPI `rosbags` computes them from the same files.
         ("swath_msgs/msg/SpacecraftState", "16783b07aaee856ca0c4713fb390a58816887ca775c80800644e7d6539b6fee4"),
         ("swath_msgs/msg/WheelTorque", "7fe6a49598a7850b3e16f4f679a54ff8c430bddf50c8b4d4dcb8894f6a57d034"),
-        ("swath_msgs/msg/DecisionPoint", "255a1562a4bd96e3d501db19ca942bc360313b1da6defb17297dda7cef2df72d"),
+        ("swath_msgs/msg/DecisionPoint", "1434ab72661b60ec6b504d5428f03db685c1538e3dbe0f8a95a616a1b5d5fe80"),
+        ("swath_msgs/msg/StripReport", "3aa2ee64544d095aac4be44fe0bc17efdad0804d419b87c4dd6a8145cdbcc056"),
+        ("swath_msgs/msg/PlannerStatus", "3df64d3c75cb3fd1a6ef4e97a9be8ccebea4a694a0f92007885a8d96992ddbe9"),
         ("swath_msgs/msg/Decision", "6cf2e48f3726d92af6cb2751a1f9f66fc0e245b7cf45938fba0eeedc9f0e6219"),
         ("swath_msgs/msg/UpcomingStrips", "1388aca98cf3f4bc2c85b3e18c2f0197f21996af32a973f5f96ad1c4d8849394"),
     ] {

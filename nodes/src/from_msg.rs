@@ -1,5 +1,7 @@
 //! From messages to the simulation's types; everything that came from outside is checked here.
 
+pub mod requests;
+
 use nalgebra::Vector3;
 use swath_msgs::geometry_msgs;
 use swath_msgs::swath_msgs as msg;
@@ -15,9 +17,9 @@ use swath_sim::time::Tick;
 use swath_sim::windows::Window;
 use thiserror::Error;
 
+use crate::approval::Mode;
 use crate::guidance::logic::TaskOrder;
 use crate::planner::logic::Upcoming;
-use crate::requests_file::NamedRequest;
 use crate::spacecraft::logic::StateSample;
 
 /// Why a message is not taken.
@@ -69,6 +71,8 @@ pub enum MessageError {
     },
 }
 
+/// Largest number in a task's result.
+const RESULT_MAX: f64 = 1e3;
 /// Largest position [m], velocity [m/s], rate [rad/s], wheel speed [rad/s] and torque [N m] that make sense.
 const POSITION_MAX: f64 = 1e8;
 const VELOCITY_MAX: f64 = 1e5;
@@ -133,6 +137,8 @@ pub fn task_record(result: &msg::TaskResult) -> Result<TaskRecord, MessageError>
         msg::TaskResult::REASON_INTERRUPTED => Some(FailureReason::Interrupted),
         value => return Err(MessageError::Constant { field: "reason", value }),
     };
+    let numbers = [result.max_attitude_error, result.min_elevation, result.reward];
+    checked("task result", numbers, RESULT_MAX)?;
     Ok(TaskRecord {
         task: result.task,
         start: Tick(result.start_tick),
@@ -215,20 +221,15 @@ pub fn task_order(model: &Model, message: &msg::ImagingTask) -> Result<TaskOrder
     Ok(TaskOrder { task: message.task, kind, strip: named })
 }
 
-/// A request as the request manager takes it; its values are checked there, each with its reason.
-#[must_use]
-pub fn named_request(message: &msg::StripRequest) -> NamedRequest {
-    NamedRequest {
-        client_ref: message.client_ref.clone(),
-        name: message.name.clone(),
-        request: StripRequest {
-            start_latitude_deg: message.start_latitude_deg,
-            start_longitude_deg: message.start_longitude_deg,
-            end_latitude_deg: message.end_latitude_deg,
-            end_longitude_deg: message.end_longitude_deg,
-            priority: message.priority,
-            acquisition_speed_m_s: message.acquisition_speed,
-            bidirectional: message.bidirectional,
-        },
+/// What the planner may do by itself.
+///
+/// # Errors
+/// When the mode is none of the constants.
+pub fn planner_mode(mode: u8) -> Result<Mode, MessageError> {
+    match mode {
+        msg::PlannerStatus::MODE_AUTONOMOUS => Ok(Mode::Autonomous),
+        msg::PlannerStatus::MODE_APPROVE => Ok(Mode::Approve),
+        msg::PlannerStatus::MODE_HOLD => Ok(Mode::Hold),
+        value => Err(MessageError::Constant { field: "mode", value }),
     }
 }

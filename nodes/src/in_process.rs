@@ -2,14 +2,17 @@
 
 use std::sync::Arc;
 
-use swath_sim::env::{Env, TaskRecord};
+use swath_sim::env::TaskRecord;
+use swath_sim::flight::Flight;
+use swath_sim::guidance::Task;
 use swath_sim::model::Model;
-use swath_sim::planner::{Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
 use swath_sim::time::Tick;
 use thiserror::Error;
 
 use crate::mission::{Mission, MissionError};
 use crate::record::TaskLine;
+use crate::requests::logic::RequestLogic;
 use crate::requests_file::NamedRequest;
 
 /// Why a mission was not flown to its end.
@@ -23,12 +26,16 @@ pub enum InProcessError {
     Planner(#[from] PlannerError),
 }
 
-/// A mission ready to be flown in this process.
+/// A mission ready to be flown in this process: the request manager of the nodes, and the flight of the simulation.
 pub struct InProcessMission {
-    env: Env,
-    names: Vec<String>,
-    accepted: usize,
+    model: Arc<Model>,
+    horizon: Tick,
+    flight: Flight,
+    requests: RequestLogic,
     requested: usize,
+    /// Number of the task to decide.
+    task: u64,
+    finished: Option<TaskRecord>,
 }
 
 impl InProcessMission {
@@ -39,38 +46,50 @@ impl InProcessMission {
     pub fn new(mission: &Mission) -> Result<Self, InProcessError> {
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
-        let env = Env::new(model, &mission.initial(), horizon);
-        let mut flight = Self { env, names: Vec::new(), accepted: 0, requested: 0 };
-        flight.submit(&mission.initial_requests()?);
-        Ok(flight)
+        let initial = mission.initial();
+        let mut prepared = Self {
+            flight: Flight::new(&model, &model, &initial),
+            requests: RequestLogic::new((*model).clone(), &initial, horizon, mission.rules()),
+            model,
+            horizon,
+            requested: 0,
+            task: 0,
+            finished: None,
+        };
+        prepared.submit(&mission.initial_requests()?);
+        Ok(prepared)
     }
 
     /// Adds requests at the present decision.
     pub fn submit(&mut self, requests: &[NamedRequest]) {
-        self.submit_since(requests, self.env.now());
+        self.submit_since(requests, self.flight.now());
     }
 
     /// Adds requests that came at an earlier tick.
     pub fn submit_since(&mut self, requests: &[NamedRequest], since: Tick) {
         self.requested += requests.len();
         for named in requests {
-            let results = self.env.submit_since(std::slice::from_ref(&named.request), since);
-            self.accepted += results.iter().filter(|result| result.is_ok()).count();
-            // A bidirectional request adds a twin of the same name.
-            self.names.resize(self.env.catalogue().len(), named.name.clone());
+            // Why one is refused is in the request manager's counts.
+            let _ = self.requests.submit_since(named.clone(), since);
         }
     }
 
     /// Constants of the mission.
     #[must_use]
     pub fn model(&self) -> &Arc<Model> {
-        self.env.model()
+        &self.model
     }
 
-    /// Strips asked for, and strips in the catalogue.
+    /// The request manager.
+    #[must_use]
+    pub fn requests(&self) -> &RequestLogic {
+        &self.requests
+    }
+
+    /// Strips asked for, and strips that were not refused.
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
-        (self.requested, self.env.catalogue().len())
+        (self.requested, self.requests.len())
     }
 
     /// Decides and flies to the end, handing each task's record and line to `each`.
@@ -93,13 +112,31 @@ impl InProcessMission {
     /// # Errors
     /// When the planner gave no usable decision.
     pub fn step(&mut self, planner: &mut dyn Planner) -> Result<Option<(TaskRecord, TaskLine)>, InProcessError> {
-        if self.env.truncated() {
+        let situation = self.flight.situation();
+        let (now, task) = (situation.now, self.task);
+        let offer = self.requests.on_decision_point(task, now, self.finished.as_slice());
+        // Nobody keeps a journal here.
+        self.requests.take_journal();
+        if now >= self.horizon {
             return Ok(None);
         }
-        let decision = planner.decide(&self.env.context())?;
-        let record = self.env.step_to_horizon(decision)?.record;
-        let name = record.strip.and_then(|id| self.names.get(id.0 as usize - 1)).map(String::as_str);
+        let candidates = &offer.candidates;
+        let context = DecisionContext { task, situation: &situation, candidates, model: &self.model };
+        let decision = planner.decide(&context)?;
+        let kind = decision.to_task(&context)?;
+        let (strip, t_pre, t_acq, priority) = match (decision, kind) {
+            (Decision::Image { candidate, .. }, Task::Image { strip, t_pre, t_acq }) => {
+                (candidates.get(candidate).map(|candidate| candidate.id), t_pre, t_acq, strip.priority)
+            }
+            _ => (None, 0, 0, 0.0),
+        };
+        let outcome = self.flight.fly(kind, self.horizon);
+        let reward = if strip.is_some() && outcome.failure.is_none() { priority } else { 0.0 };
+        let record = TaskRecord { task, start: now, end: self.flight.now(), strip, t_pre, t_acq, outcome, reward };
+        let name = strip.and_then(|id| self.requests.request(id)).map(|request| request.named.name.as_str());
         let line = TaskLine::new(&record, name);
+        self.task += 1;
+        self.finished = Some(record.clone());
         Ok(Some((record, line)))
     }
 }

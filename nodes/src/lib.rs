@@ -3,6 +3,7 @@
 //! A node is two files: `logic.rs`, which knows no ROS, and `wiring.rs`, which knows nothing else.
 #![expect(non_snake_case, reason = "frame letters")]
 
+pub mod approval;
 pub mod bag;
 pub mod from_msg;
 pub mod guidance;
@@ -10,11 +11,12 @@ pub mod in_process;
 pub mod launch;
 pub mod mission;
 pub mod node;
+pub mod operate;
 pub mod planner;
 pub mod planners;
 pub mod record;
 pub mod requests;
 pub mod requests_file;
 pub mod spacecraft;
-pub mod strips;
+pub mod time_text;
 pub mod to_msg;

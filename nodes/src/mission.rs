@@ -13,7 +13,10 @@ use swath_sim::scenario::{InitialState, ScenarioConfig};
 use swath_sim::time::Tick;
 use thiserror::Error;
 
-use crate::requests_file::{self, NamedRequest, RequestsFileError};
+use crate::approval::ApprovalConfig;
+use crate::requests::logic::Rules;
+use crate::requests::refusal::ATTEMPTS_MAX;
+use crate::requests_file::{self, Lengths, NamedRequest, RequestsFileError};
 
 /// Why a mission cannot be flown.
 #[derive(Debug, Error)]
@@ -71,8 +74,10 @@ pub struct Mission {
     /// Planner: `lookahead`, `lookahead:TICKS` of margin, `heuristic:SECONDS`, `random`, or a kind of policy, such as
     /// `hop-ppo` for the shipped one and `hop-ppo:FILE` for another; see [`PlannerSpec`].
     pub planner: PlannerSpec,
-    /// Strips known from the start.
+    /// Strips known from the start, and what holds for all.
     pub requests: MissionRequests,
+    /// What the planner may do by itself.
+    pub approval: ApprovalConfig,
     /// Longest wait for a task in lockstep [s of wall clock]; after it the attitude is held for `hold_s`.
     pub planning_deadline_s: f64,
     /// How long the attitude is held when no task came in time [s of simulated time].
@@ -85,14 +90,22 @@ pub struct Mission {
 }
 
 /// Strips known from the start.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MissionRequests {
     /// GeoJSON files, relative to the mission file.
     pub files: Vec<PathBuf>,
+    /// Attempts before a request fails, for requests that do not say; attempts that were cut short do not count.
+    pub max_attempts: u32,
     /// Random strips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub random: Option<ScenarioConfig>,
+}
+
+impl Default for MissionRequests {
+    fn default() -> Self {
+        Self { files: Vec::new(), max_attempts: 10, random: None }
+    }
 }
 
 impl Default for Mission {
@@ -106,6 +119,7 @@ impl Default for Mission {
             epoch_unix_s: 1_767_225_600,
             planner: PlannerSpec::default(),
             requests: MissionRequests::default(),
+            approval: ApprovalConfig::default(),
             planning_deadline_s: 10.0,
             hold_s: 10.0,
             initial: None,
@@ -143,6 +157,9 @@ impl Mission {
             ("pace", self.pace, 0.0, 1e6),
             ("planning_deadline_s", self.planning_deadline_s, 0.01, 3600.0),
             ("hold_s", self.hold_s, 0.1, 3600.0),
+            ("requests.max_attempts", f64::from(self.requests.max_attempts), 1.0, f64::from(ATTEMPTS_MAX)),
+            ("approval.deadline_s", self.approval.deadline_s, 0.1, 1e6),
+            ("approval.look_again_s", self.approval.look_again_s, 0.1, 3600.0),
         ] {
             if !(min..=max).contains(&value) {
                 return Err(MissionError::OutOfRange { name, value, min, max });
@@ -175,6 +192,20 @@ impl Mission {
         Ok(Model::new(self.sim.clone())?)
     }
 
+    /// What the mission says of its requests.
+    #[must_use]
+    pub fn rules(&self) -> Rules {
+        Rules { epoch_ns: u64::from(self.epoch_unix_s) * 1_000_000_000, max_attempts: self.requests.max_attempts }
+    }
+
+    /// What the requests of a mission rest on, as a text that differs when two missions differ in it: the satellite,
+    /// its orbit, the length and the limits. The pace and the planner may change.
+    #[must_use]
+    pub fn identity(&self) -> String {
+        let identity = (self.seed, self.orbits.to_bits(), self.epoch_unix_s, self.initial(), &self.sim);
+        serde_json::to_string(&identity).unwrap_or_default()
+    }
+
     /// Tick at which the mission ends.
     #[must_use]
     pub fn horizon(&self, model: &Model) -> Tick {
@@ -188,16 +219,14 @@ impl Mission {
     pub fn initial_requests(&self) -> Result<Vec<NamedRequest>, MissionError> {
         let mut requests = Vec::new();
         for file in &self.requests.files {
-            requests.extend(requests_file::read(file)?);
+            requests.extend(requests_file::read(file, Lengths::of(&self.sim))?);
         }
         if let Some(scenario) = &self.requests.random {
             let mut rng = rng::stream(self.seed, rng::CATALOGUE);
             let count = scenario.draw_count(&mut rng);
             let random = scenario.generate(&mut rng, count, self.sim.earth.radius_m);
-            requests.extend(random.into_iter().enumerate().map(|(i, request)| NamedRequest {
-                client_ref: format!("random-{}", i + 1),
-                name: format!("random {}", i + 1),
-                request,
+            requests.extend((1..).zip(random).map(|(number, request)| {
+                NamedRequest::new(format!("random-{number}"), format!("random {number}"), request)
             }));
         }
         Ok(requests)

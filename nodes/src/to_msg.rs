@@ -1,5 +1,7 @@
 //! From the simulation's types to messages; nothing can go wrong here.
 
+pub mod requests;
+
 use nalgebra::Vector3;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::geometry_msgs;
@@ -10,9 +12,10 @@ use swath_sim::guidance::{FailureReason, Task};
 use swath_sim::planner::Decision;
 use swath_sim::time::{Tick, TickPeriod};
 
+use crate::approval::Mode;
 use crate::guidance::logic::{Command, DecisionPoint, FinishedTask};
-use crate::planner::logic::{Planned, Upcoming};
-use crate::requests::logic::{Change, Offer, Standing};
+use crate::planner::logic::{Planned, PlannerLogic, Upcoming};
+use crate::requests::logic::Offer;
 use crate::requests_file::NamedRequest;
 use crate::spacecraft::logic::StateSample;
 
@@ -49,11 +52,24 @@ impl Stamper {
         swath_ros::stamp(self.nanoseconds(tick))
     }
 
+    /// The first tick at a time or after it; the epoch for times before it.
+    #[must_use]
+    pub fn tick_from(&self, time: &Time) -> Tick {
+        let ns = nanoseconds(time).saturating_sub(self.nanoseconds(Tick(0)));
+        Tick(ns.div_ceil(self.period.nanoseconds()))
+    }
+
     /// Header of a message at a tick.
     #[must_use]
     pub fn header(&self, tick: Tick, frame: &str) -> Header {
         Header { stamp: self.time(tick), frame_id: frame.to_owned() }
     }
+}
+
+/// A time [ns since 1970-01-01 UTC]; 0 for times before.
+#[must_use]
+pub fn nanoseconds(time: &Time) -> u64 {
+    u64::try_from(time.sec).map_or(0, |seconds| seconds * 1_000_000_000 + u64::from(time.nanosec))
 }
 
 /// A vector by its components.
@@ -132,6 +148,7 @@ pub fn decision_point(stamper: &Stamper, point: &DecisionPoint) -> msg::Decision
         torque_pending: point.situation.torque_pending.into(),
         mission_over: point.mission_over,
         result: point.finished.as_ref().map(task_result).into_iter().collect::<Vec<_>>(),
+        last_imaging: point.last_imaging.as_ref().map(task_result).into_iter().collect::<Vec<_>>(),
     }
 }
 
@@ -177,25 +194,6 @@ pub fn strip(id: u64, named: &NamedRequest) -> msg::Strip {
     }
 }
 
-/// A request as an operator submits it.
-#[must_use]
-pub fn strip_request(named: &NamedRequest, submitter: &str) -> msg::StripRequest {
-    let request = &named.request;
-    msg::StripRequest {
-        client_ref: named.client_ref.clone(),
-        submitter: submitter.to_owned(),
-        name: named.name.clone(),
-        start_latitude_deg: request.start_latitude_deg,
-        start_longitude_deg: request.start_longitude_deg,
-        end_latitude_deg: request.end_latitude_deg,
-        end_longitude_deg: request.end_longitude_deg,
-        priority: request.priority,
-        acquisition_speed: request.acquisition_speed_m_s,
-        bidirectional: request.bidirectional,
-        ..msg::StripRequest::default()
-    }
-}
-
 /// What the planner is offered; `request` gives what was asked for under an identity.
 #[must_use]
 pub fn upcoming_strips<'a>(
@@ -218,6 +216,18 @@ pub fn upcoming_strips<'a>(
         candidates: candidates.collect::<Vec<_>>(),
         pending: offer.pending as u64,
         fulfilled: offer.fulfilled as u64,
+    }
+}
+
+/// The task in hand enters a phase.
+#[must_use]
+pub fn task_phase(stamper: &Stamper, command: &Command, strip: u64) -> msg::TaskPhase {
+    msg::TaskPhase {
+        header: stamper.header(command.tick, BODY_FRAME),
+        tick: command.tick.0,
+        task: command.task,
+        strip_id: strip,
+        phase: phase(command),
     }
 }
 
@@ -246,6 +256,37 @@ pub fn imaging_task(stamper: &Stamper, planned: &Planned, strips: &[msg::Candida
     task
 }
 
+/// What the planner may do by itself, and what it proposes; `strip` is the one proposed.
+#[must_use]
+pub fn planner_status(stamper: &Stamper, now: Tick, logic: &PlannerLogic, strip: msg::Strip) -> msg::PlannerStatus {
+    let gate = logic.gate();
+    let status = msg::PlannerStatus {
+        header: stamper.header(now, EARTH_FRAME),
+        mode: match gate.mode() {
+            Mode::Autonomous => msg::PlannerStatus::MODE_AUTONOMOUS,
+            Mode::Approve => msg::PlannerStatus::MODE_APPROVE,
+            Mode::Hold => msg::PlannerStatus::MODE_HOLD,
+        },
+        planner: logic.planner_name(),
+        last_outcome: gate.last_outcome().to_owned(),
+        ..msg::PlannerStatus::default()
+    };
+    let Some(proposal) = gate.proposal() else { return status };
+    msg::PlannerStatus {
+        proposal_state: if proposal.approved {
+            msg::PlannerStatus::PROPOSAL_APPROVED
+        } else {
+            msg::PlannerStatus::PROPOSAL_OPEN
+        },
+        proposal: proposal.number,
+        strip,
+        t_pre_ticks: proposal.t_pre,
+        window_close_tick: proposal.candidate.window.close.0,
+        deadline_tick: proposal.deadline.map_or(0, |deadline| deadline.0),
+        ..status
+    }
+}
+
 /// How the planner chose.
 #[must_use]
 pub fn decision(stamper: &Stamper, planned: &Planned, upcoming: &Upcoming, compute_time_s: f64) -> msg::Decision {
@@ -266,52 +307,5 @@ pub fn decision(stamper: &Stamper, planned: &Planned, upcoming: &Upcoming, compu
         chosen,
         t_pre_ticks,
         compute_time_s,
-    }
-}
-
-/// A change of a strip's standing.
-#[must_use]
-pub fn strip_status(stamper: &Stamper, change: &Change) -> msg::StripStatus {
-    msg::StripStatus {
-        header: stamper.header(change.tick, EARTH_FRAME),
-        strip: strip(change.id.0, &change.request),
-        client_ref: change.request.client_ref.clone(),
-        state: match change.standing {
-            Standing::Rejected => msg::StripStatus::STATE_REJECTED,
-            Standing::Accepted => msg::StripStatus::STATE_ACCEPTED,
-            Standing::Scheduled => msg::StripStatus::STATE_SCHEDULED,
-            Standing::Completed => msg::StripStatus::STATE_COMPLETED,
-            Standing::Expired => msg::StripStatus::STATE_EXPIRED,
-            Standing::FulfilledByLink => msg::StripStatus::STATE_FULFILLED_BY_LINK,
-        },
-        reason_code: change.reason.0,
-        reason: change.reason.1.clone(),
-        tick: change.tick.0,
-        attempts: change.attempts,
-        reward: change.reward,
-        linked_to: change.linked.map_or(0, |id| id.0),
-    }
-}
-
-/// How many strips stand where.
-#[must_use]
-pub fn request_summary(
-    stamper: &Stamper,
-    tick: Tick,
-    counts: impl Fn(Standing) -> usize,
-    reward: f64,
-) -> msg::RequestSummary {
-    let count = |standing| counts(standing) as u64;
-    msg::RequestSummary {
-        header: stamper.header(tick, EARTH_FRAME),
-        tick: tick.0,
-        rejected: count(Standing::Rejected),
-        accepted: count(Standing::Accepted),
-        scheduled: count(Standing::Scheduled),
-        completed: count(Standing::Completed),
-        expired: count(Standing::Expired),
-        fulfilled_by_link: count(Standing::FulfilledByLink),
-        reward,
-        ..msg::RequestSummary::default()
     }
 }

@@ -1,4 +1,5 @@
-//! An outside ROS 2 peer (CycloneDDS) receives states and status, and submits strips that are then imaged.
+//! An outside ROS 2 peer (CycloneDDS) receives states and status, submits strips that are then imaged, previews one and
+//! cancels one.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 mod common;
@@ -17,6 +18,12 @@ fn a_cyclonedds_peer_sees_the_mission_and_has_a_strip_imaged() {
     assert!((seen["radius_m"].as_f64().unwrap() - 6_898_136.6).abs() < 1.0, "{seen}");
     assert!(seen["accepted"].as_u64().unwrap() > 30, "{seen}");
     assert_eq!(seen["refused"], serde_json::json!([100, 101]), "{seen}");
+    assert!(seen["opportunities"].as_u64().unwrap() > 3, "{seen}");
+    for elevation in seen["elevations"].as_array().unwrap() {
+        assert!((10.0_f64.to_radians()..1.6).contains(&elevation.as_f64().unwrap()), "{seen}");
+    }
+    assert_eq!(seen["no_opportunity"], 110, "{seen}");
+    assert_eq!(seen["cancelled"], serde_json::json!([[true, 0], [false, 120]]), "{seen}");
     assert!(seen["imaged"].as_str().unwrap().starts_with("peer-"), "{seen}");
     assert_eq!(seen["imaged_reward"], 0.9, "{seen}");
     launch.stop();

@@ -27,6 +27,8 @@ pub struct Candidate {
 pub enum StripState {
     /// Not imaged yet; a window is still to come.
     Pending,
+    /// As pending, but not offered until it is released.
+    Held,
     /// Imaged.
     Fulfilled,
     /// Its linked twin was imaged.
@@ -53,6 +55,35 @@ pub struct Entry {
     next: usize,
 }
 
+/// When a strip may be imaged: not before `from`, and done by `until`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Validity {
+    /// First tick at which imaging may start.
+    pub from: Tick,
+    /// Last tick of imaging; `None` for any.
+    pub until: Option<Tick>,
+}
+
+impl Validity {
+    /// What is left of a start window of a strip that takes `t_acq` ticks.
+    fn clip(self, window: Window, t_acq: u32) -> Option<Window> {
+        let latest = self.until.map_or(Some(u64::MAX), |until| until.0.checked_sub(u64::from(t_acq)))?;
+        let window = Window { open: window.open.max(self.from), close: window.close.min(Tick(latest)) };
+        (window.open <= window.close).then_some(window)
+    }
+}
+
+/// A strip with its windows, not yet in a catalogue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prepared {
+    /// The strip.
+    pub strip: Strip,
+    /// Acquisition time T_acq [ticks].
+    pub t_acq: u32,
+    /// Start windows, in order; at least one.
+    pub windows: Vec<Window>,
+}
+
 /// The strips of a mission. Identities are numbers from 1 in order of addition.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
@@ -61,6 +92,8 @@ pub struct Catalogue {
     entries: Vec<Entry>,
     /// Pending strips by the closing of their next window.
     queue: BTreeSet<(Tick, StripId)>,
+    /// Held strips by the closing of their last window.
+    held: BTreeSet<(Tick, StripId)>,
 }
 
 impl Catalogue {
@@ -72,6 +105,7 @@ impl Catalogue {
             horizon,
             entries: Vec::new(),
             queue: BTreeSet::new(),
+            held: BTreeSet::new(),
         }
     }
 
@@ -96,24 +130,60 @@ impl Catalogue {
     }
 
     fn add_one_way(&mut self, model: &Model, request: &StripRequest, now: Tick) -> Result<StripId, StripError> {
+        Ok(self.insert(self.prepare(model, request, Validity::default(), now)?))
+    }
+
+    /// The strip of a request that becomes known at `now`, one way, with its windows up to the horizon.
+    ///
+    /// # Errors
+    /// Why the request is refused.
+    pub fn prepare(
+        &self,
+        model: &Model,
+        request: &StripRequest,
+        validity: Validity,
+        now: Tick,
+    ) -> Result<Prepared, StripError> {
         let strip = request.to_strip(&model.config.requests, model.config.earth.radius_m)?;
+        let t_acq = strip.acquisition_ticks(model.period);
         let mut windows = Vec::new();
         self.finder.find(&strip, now, self.horizon, &mut windows);
-        let Some(first) = windows.first() else {
+        if validity != Validity::default() {
+            windows = windows.into_iter().filter_map(|window| validity.clip(window, t_acq)).collect();
+            windows.retain(|window| window.close > now);
+        }
+        if windows.is_empty() {
             let horizon_s = model.period.time_s(self.horizon) - model.period.time_s(now);
             return Err(StripError::NoWindow { horizon_s });
-        };
+        }
+        Ok(Prepared { strip, t_acq, windows })
+    }
+
+    /// Adds a prepared strip; one without windows has expired.
+    pub fn insert(&mut self, prepared: Prepared) -> StripId {
+        let Prepared { strip, t_acq, windows } = prepared;
         let id = StripId(self.entries.len() as u64 + 1);
-        self.queue.insert((first.close, id));
-        self.entries.push(Entry {
-            strip,
-            t_acq: strip.acquisition_ticks(model.period),
-            windows,
-            state: StripState::Pending,
-            linked: None,
-            next: 0,
-        });
-        Ok(id)
+        let state = match windows.first() {
+            Some(first) => {
+                self.queue.insert((first.close, id));
+                StripState::Pending
+            }
+            None => StripState::Expired,
+        };
+        self.entries.push(Entry { strip, t_acq, windows, state, linked: None, next: 0 });
+        id
+    }
+
+    /// What finds the windows.
+    #[must_use]
+    pub fn finder(&self) -> &WindowFinder {
+        &self.finder
+    }
+
+    /// Tick up to which windows are sought.
+    #[must_use]
+    pub fn horizon(&self) -> Tick {
+        self.horizon
     }
 
     /// Adds every request that can be flown and leaves out the others, such as strips too far from the equator for the
@@ -122,7 +192,8 @@ impl Catalogue {
         requests.iter().filter(|request| self.add(model, request, now).is_ok()).count()
     }
 
-    fn link(&mut self, a: StripId, b: StripId) {
+    /// Makes two strips each other's twin: fulfilling either fulfils both.
+    pub fn link(&mut self, a: StripId, b: StripId) {
         for (one, other) in [(a, b), (b, a)] {
             if let Some(entry) = self.entry_mut(one) {
                 entry.linked = Some(other);
@@ -175,16 +246,41 @@ impl Catalogue {
             }
             self.queue.pop_first();
             let entry = &mut self.entries[id.0 as usize - 1];
-            let closed = entry.windows[entry.next..].iter().take_while(|window| window.close <= now).count();
-            entry.next += closed;
-            if let Some(window) = entry.windows.get(entry.next) {
+            if let Some(window) = entry.next_after(now) {
                 self.queue.insert((window.close, id));
             } else {
                 entry.state = StripState::Expired;
                 expired.push(id);
             }
         }
+        while let Some(&(_, id)) = self.held.first().filter(|&&(close, _)| close <= now) {
+            self.held.pop_first();
+            self.entries[id.0 as usize - 1].state = StripState::Expired;
+            expired.push(id);
+        }
         expired
+    }
+
+    /// Stops offering a pending strip. Returns whether it was pending.
+    pub fn hold(&mut self, id: StripId) -> bool {
+        if self.get(id).is_none_or(|entry| entry.state != StripState::Pending) || !self.leave(id, StripState::Held) {
+            return false;
+        }
+        if let Some(last) = self.get(id).and_then(|entry| entry.windows.last()) {
+            self.held.insert((last.close, id));
+        }
+        true
+    }
+
+    /// Offers a held strip again. Returns whether it was held.
+    pub fn release(&mut self, id: StripId) -> bool {
+        if self.get(id).is_none_or(|entry| entry.state != StripState::Held) || !self.leave(id, StripState::Pending) {
+            return false;
+        }
+        let Some(entry) = self.get(id) else { return false };
+        // Windows that closed meanwhile are passed over by the next `next`.
+        self.queue.insert((entry.windows[entry.next].close, id));
+        true
     }
 
     /// Marks a strip as imaged, and its twin with it. Returns its priority, or `None` when it was not pending.
@@ -200,23 +296,43 @@ impl Catalogue {
         Some(priority)
     }
 
-    /// Takes a pending strip back. Returns whether it was pending.
+    /// Takes a pending or held strip back. Returns whether it was either.
     pub fn remove(&mut self, id: StripId) -> bool {
         self.leave(id, StripState::Removed)
     }
 
     fn leave(&mut self, id: StripId, state: StripState) -> bool {
         let Some(entry) = self.entry_mut(id) else { return false };
-        if entry.state != StripState::Pending {
-            return false;
+        let before = std::mem::replace(&mut entry.state, state);
+        let (next, last) = (entry.windows.get(entry.next).copied(), entry.windows.last().copied());
+        match (before, next, last) {
+            (StripState::Pending, Some(next), _) => self.queue.remove(&(next.close, id)),
+            (StripState::Held, _, Some(last)) => self.held.remove(&(last.close, id)),
+            _ => {
+                if let Some(entry) = self.entry_mut(id) {
+                    entry.state = before;
+                }
+                false
+            }
         }
-        entry.state = state;
-        let close = entry.windows[entry.next].close;
-        self.queue.remove(&(close, id))
     }
 
     fn entry_mut(&mut self, id: StripId) -> Option<&mut Entry> {
         self.entries.get_mut(index(id)?)
+    }
+}
+
+impl Entry {
+    /// The first window that closes after `now`; the ones before it are not looked at again.
+    fn next_after(&mut self, now: Tick) -> Option<Window> {
+        self.next += self.windows[self.next..].iter().take_while(|window| window.close <= now).count();
+        self.windows.get(self.next).copied()
+    }
+
+    /// Windows that close after `now`.
+    pub fn windows_after(&self, now: Tick) -> &[Window] {
+        let closed = self.windows.partition_point(|window| window.close <= now);
+        &self.windows[closed..]
     }
 }
 
@@ -268,6 +384,48 @@ mod tests {
         assert_eq!(expired.len(), pending);
         assert!(candidates.is_empty());
         assert_eq!(catalogue.get(expired[0]).unwrap().state, StripState::Expired);
+    }
+
+    #[test]
+    fn held_strips_are_not_offered_and_expire_all_the_same() {
+        let (_, mut catalogue) = catalogue();
+        let mut candidates = Vec::new();
+        catalogue.next(Tick(0), 40, &mut candidates);
+        let id = candidates[0].id;
+        assert!(catalogue.hold(id) && !catalogue.hold(id));
+        catalogue.next(Tick(0), 40, &mut candidates);
+        assert!(candidates.iter().all(|candidate| candidate.id != id));
+        assert!(catalogue.release(id) && !catalogue.release(id));
+        catalogue.next(Tick(0), 40, &mut candidates);
+        assert_eq!(candidates[0].id, id);
+        assert!(catalogue.hold(id));
+        assert!(catalogue.next(Tick(400_000), 40, &mut candidates).contains(&id));
+        assert!(!catalogue.release(id) && !catalogue.remove(id));
+    }
+
+    #[test]
+    fn validity_clips_windows_so_that_imaging_is_done_in_time() {
+        let (model, catalogue) = catalogue();
+        let request = StripRequest {
+            start_latitude_deg: 10.0,
+            start_longitude_deg: 20.0,
+            end_latitude_deg: 12.0,
+            end_longitude_deg: 21.0,
+            priority: 0.5,
+            acquisition_speed_m_s: 3000.0,
+            bidirectional: false,
+        };
+        let any = catalogue.prepare(&model, &request, Validity::default(), Tick(0)).unwrap();
+        let window = any.windows[1];
+        let validity =
+            Validity { from: Tick(window.open.0 + 3), until: Some(Tick(window.close.0 + u64::from(any.t_acq) - 5)) };
+        let clipped = catalogue.prepare(&model, &request, validity, Tick(0)).unwrap();
+        let expected = Window { open: Tick(window.open.0 + 3), close: Tick(window.close.0 - 5) };
+        assert_eq!(clipped.windows, [expected]);
+        let between = Validity { from: Tick(any.windows[0].close.0 + 1), until: Some(window.open) };
+        assert_eq!(catalogue.prepare(&model, &request, between, Tick(0)).unwrap_err().code(), 110);
+        let early = Validity { from: Tick(0), until: Some(Tick(3)) };
+        assert_eq!(catalogue.prepare(&model, &request, early, Tick(0)).unwrap_err().code(), 110);
     }
 
     #[test]

@@ -26,6 +26,8 @@ impl Window {
 
 /// Spacing of the points of a strip at which visibility is sought [s], as in BSK-RL.
 const CHECKPOINT_SPACING_S: f64 = 30.0;
+/// Spacing of the points of a strip at which its least elevation is sought [s].
+const ELEVATION_SPACING_S: f64 = 2.0;
 /// Windows are drawn in by this much before they are rounded to ticks, for the roots' own error [s].
 const ROOT_MARGIN_S: f64 = 1e-6;
 /// How far before a span its first pass may culminate [s]: longer than half of any pass.
@@ -46,6 +48,8 @@ pub struct WindowFinder {
     earth_at_epoch: f64,
     earth_rate: f64,
     cos_limit: f64,
+    /// Earth's radius over the orbit's.
+    ratio: f64,
     period: TickPeriod,
 }
 
@@ -71,6 +75,7 @@ impl WindowFinder {
             earth_at_epoch: config.earth.angle_at_epoch_deg.to_radians(),
             earth_rate: config.earth.rotation_rad_s,
             cos_limit: libm::cos(limit),
+            ratio,
             period,
         }
     }
@@ -90,6 +95,19 @@ impl WindowFinder {
             }
             culmination = self.nearest_culmination(&strip.start_E, culmination + revolution);
         }
+    }
+
+    /// Least elevation of the satellite seen from the target while a strip is imaged from `start` on [rad].
+    #[must_use]
+    pub fn least_elevation(&self, strip: &Strip, start: Tick) -> f64 {
+        let (from_s, duration) = (self.period.time_s(start), strip.acquisition_time_s());
+        let steps = (duration / ELEVATION_SPACING_S).ceil().max(1.0) as u32;
+        let elevation = |step: u32| {
+            let elapsed = duration * f64::from(step) / f64::from(steps);
+            let cos = self.visibility(&strip.target_E(elapsed).0, from_s + elapsed).g.clamp(-1.0, 1.0);
+            libm::atan2(cos - self.ratio, (1.0 - cos * cos).sqrt())
+        };
+        (0..=steps).map(elevation).fold(f64::INFINITY, f64::min)
     }
 
     fn to_ticks(&self, open_s: f64, close_s: f64) -> Window {
@@ -261,5 +279,29 @@ mod tests {
             found += windows.len();
         }
         assert!(found > 40, "only {found} windows");
+    }
+
+    #[test]
+    fn the_least_elevation_is_the_limit_at_a_windows_edge_and_more_within() {
+        let model = Model::new(SimConfig::default()).unwrap();
+        let orbit =
+            Orbit::new(&model.config, OrbitPhase { raan_deg: 0.0, argument_of_latitude_deg: 0.0 }, model.period);
+        let finder = WindowFinder::new(&model.config, &orbit, model.period);
+        let requests =
+            ScenarioConfig::default().generate(&mut rng::stream(5, rng::CATALOGUE), 40, model.config.earth.radius_m);
+        let mut looked_at = 0;
+        for request in &requests {
+            let strip = request.to_strip(&model.config.requests, model.config.earth.radius_m).unwrap();
+            let mut windows = Vec::new();
+            finder.find(&strip, Tick(0), Tick(86_400), &mut windows);
+            for window in windows.iter().filter(|window| window.open.0 > 0 && window.close.since(window.open) > 100) {
+                let edge = finder.least_elevation(&strip, window.open).to_degrees();
+                assert!((10.0..10.1).contains(&edge), "{edge}");
+                let middle = Tick((window.open.0 + window.close.0) / 2);
+                assert!(finder.least_elevation(&strip, middle).to_degrees() > edge + 0.1);
+                looked_at += 1;
+            }
+        }
+        assert!(looked_at > 20, "only {looked_at} windows");
     }
 }

@@ -11,8 +11,9 @@ use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
-    Decision, DecisionPoint, GuidanceStatus, ImagingTask, RequestSummary, SpacecraftState, StripRequest, StripStatus,
-    SubmitStrips, UpcomingStrips, WheelTorque,
+    CancelStrips, Decision, DecisionPoint, GetStrip, GuidanceStatus, ImagingTask, ListHistory, ListStrips,
+    PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode,
+    SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -107,6 +108,14 @@ pub const DECISION_POINT: Topic<DecisionPoint> =
 /// What guidance is doing, every ten seconds.
 pub const GUIDANCE_STATUS: Topic<GuidanceStatus> =
     Topic::new("guidance/status", Profile::Event, &[GUIDANCE], &[LAUNCHER]);
+/// The task in hand enters another phase.
+pub const TASK_PHASE: Topic<TaskPhase> = Topic::new("guidance/phase", Profile::Event, &[GUIDANCE], &[REQUEST_MANAGER]);
+/// A task that is no longer wanted.
+pub const TASK_ABORT: Topic<TaskAbort> =
+    Topic::new("requests/abort", Profile::Command, &[REQUEST_MANAGER], &[GUIDANCE]);
+/// What the planner may do by itself, and what it proposes.
+pub const PLANNER_STATUS: Topic<PlannerStatus> =
+    Topic::new("planner/status", Profile::Latched, &[PLANNER], &[OPERATOR]);
 /// The next task.
 pub const PLANNER_TASK: Topic<ImagingTask> =
     Topic::new("planner/task", Profile::Command, &[PLANNER], &[GUIDANCE, REQUEST_MANAGER]);
@@ -141,6 +150,25 @@ pub const PARAMETER_EVENTS: Topic<ParameterEvent> = Topic::new("/parameter_event
 /// Submits strip requests, with an answer for each.
 pub const SUBMIT_STRIPS: Service<SubmitStrips> = Service::new("requests/submit", &[REQUEST_MANAGER], &[OPERATOR]);
 
+/// Takes strip requests back.
+pub const CANCEL_STRIPS: Service<CancelStrips> = Service::new("requests/cancel", &[REQUEST_MANAGER], &[OPERATOR]);
+/// Replaces a strip request by another one.
+pub const REPLACE_STRIP: Service<ReplaceStrip> = Service::new("requests/replace", &[REQUEST_MANAGER], &[OPERATOR]);
+/// Decides on held strip requests, or holds accepted ones.
+pub const REVIEW_STRIPS: Service<ReviewStrips> = Service::new("requests/review", &[REQUEST_MANAGER], &[OPERATOR]);
+/// All that is known of a strip request.
+pub const GET_STRIP: Service<GetStrip> = Service::new("requests/get", &[REQUEST_MANAGER], &[OPERATOR]);
+/// Strip requests by state, area and time, page by page.
+pub const LIST_STRIPS: Service<ListStrips> = Service::new("requests/list", &[REQUEST_MANAGER], &[OPERATOR]);
+/// The audit trail, page by page.
+pub const LIST_HISTORY: Service<ListHistory> = Service::new("requests/history", &[REQUEST_MANAGER], &[OPERATOR]);
+/// When a strip could be imaged.
+pub const PREVIEW_STRIP: Service<PreviewStrip> = Service::new("requests/preview", &[REQUEST_MANAGER], &[OPERATOR]);
+/// What the planner may do by itself.
+pub const SET_PLANNER_MODE: Service<SetPlannerMode> = Service::new("planner/set_mode", &[PLANNER], &[OPERATOR]);
+/// Approves or rejects what the planner proposes.
+pub const REVIEW_PROPOSAL: Service<ReviewProposal> = Service::new("planner/review", &[PLANNER], &[OPERATOR]);
+
 /// Every topic of the table; the recorder records these.
 pub const TOPICS: &[Entry] = &[
     CLOCK.entry,
@@ -151,19 +179,33 @@ pub const TOPICS: &[Entry] = &[
     WHEEL_TORQUE.entry,
     DECISION_POINT.entry,
     GUIDANCE_STATUS.entry,
+    TASK_PHASE.entry,
     UPCOMING_STRIPS.entry,
     STRIP_REQUEST.entry,
     STRIP_EVENTS.entry,
     REQUEST_SUMMARY.entry,
+    TASK_ABORT.entry,
     PLANNER_TASK.entry,
     PLANNER_DECISION.entry,
+    PLANNER_STATUS.entry,
     DIAGNOSTICS.entry,
     ROSOUT.entry,
     PARAMETER_EVENTS.entry,
 ];
 
 /// Every service of the table; those for parameters, which each node has, are not listed.
-pub const SERVICES: &[Entry] = &[SUBMIT_STRIPS.entry];
+pub const SERVICES: &[Entry] = &[
+    SUBMIT_STRIPS.entry,
+    CANCEL_STRIPS.entry,
+    REPLACE_STRIP.entry,
+    REVIEW_STRIPS.entry,
+    GET_STRIP.entry,
+    LIST_STRIPS.entry,
+    LIST_HISTORY.entry,
+    PREVIEW_STRIP.entry,
+    SET_PLANNER_MODE.entry,
+    REVIEW_PROPOSAL.entry,
+];
 
 /// The table as a Mermaid flow chart: nodes are boxes, topics are arrows between them.
 pub fn mermaid() -> String {
@@ -251,15 +293,27 @@ mod tests {
     guidance -->|guidance/decision_point| planner
     guidance -->|guidance/decision_point| launcher
     guidance -->|guidance/status| launcher
+    guidance -->|guidance/phase| request_manager
     request_manager -->|requests/upcoming| planner
     operator -->|requests/request| request_manager
     request_manager -->|requests/events| operator
     request_manager -->|requests/summary| launcher
     request_manager -->|requests/summary| operator
+    request_manager -->|requests/abort| guidance
     planner -->|planner/task| guidance
     planner -->|planner/task| request_manager
     planner -->|planner/decision| launcher
+    planner -->|planner/status| operator
     operator <-.->|requests/submit| request_manager
+    operator <-.->|requests/cancel| request_manager
+    operator <-.->|requests/replace| request_manager
+    operator <-.->|requests/review| request_manager
+    operator <-.->|requests/get| request_manager
+    operator <-.->|requests/list| request_manager
+    operator <-.->|requests/history| request_manager
+    operator <-.->|requests/preview| request_manager
+    operator <-.->|planner/set_mode| planner
+    operator <-.->|planner/review| planner
     FLIGHT([every topic]) --> recorder
 ";
         assert_eq!(mermaid(), expected);

@@ -159,10 +159,11 @@ impl Recorded {
     /// When the recording does not begin with the mission, or a strip is missing in it.
     pub fn arrivals(&self) -> Result<Vec<Arrival>> {
         let Some(first) = self.offers.get(&0) else { bail!("the recording does not begin with the mission") };
-        // The strips known at the first decision are those pending and those that expired at once.
-        let is_at_first = |event: &&msg::StripStatus| event.tick == first.tick;
-        let expired = |event: &&msg::StripStatus| event.state == msg::StripStatus::STATE_EXPIRED;
-        let known = first.pending + self.events.iter().filter(is_at_first).filter(expired).count() as u64;
+        // The strips known at the first decision are those pending, those held, and those that expired at once.
+        let is_at_first = |event: &&msg::StripStatus| event.tick == first.tick && event.strip.id > 0;
+        let not_offered = [msg::StripStatus::STATE_EXPIRED, msg::StripStatus::STATE_HELD];
+        let left_out = |event: &&msg::StripStatus| not_offered.contains(&event.state);
+        let known = first.pending + self.events.iter().filter(is_at_first).filter(left_out).count() as u64;
         let starts: Vec<Tick> = self.offers.values().map(|offer| Tick(offer.tick)).collect();
         let mut arrivals = Vec::new();
         let mut next = 1;
@@ -179,8 +180,9 @@ impl Recorded {
             };
             let mut request = from_msg::request_of_strip(&event.strip);
             request.bidirectional = bidirectional;
+            let (client_ref, name) = (event.client_ref.clone(), event.strip.name.clone());
             let request =
-                NamedRequest { client_ref: event.client_ref.clone(), name: event.strip.name.clone(), request };
+                NamedRequest { submitter: event.submitter.clone(), ..NamedRequest::new(client_ref, name, request) };
             arrivals.push(Arrival { decision, since: Tick(event.tick), request });
         }
         Ok(arrivals)
@@ -217,7 +219,8 @@ fn mission_of(bag: &Bag) -> Result<Mission> {
     let manifest = bag.metadata_named(MANIFEST).with_context(|| format!("no metadata record {MANIFEST}"))?;
     let text = manifest.get(MANIFEST_TEXT).with_context(|| format!("{MANIFEST} has no entry {MANIFEST_TEXT}"))?;
     let mission: Mission = toml::from_str(text).with_context(|| format!("{MANIFEST} is no mission"))?;
-    let mission = Mission { requests: MissionRequests::default(), ..mission };
+    let requests = MissionRequests { max_attempts: mission.requests.max_attempts, ..MissionRequests::default() };
+    let mission = Mission { requests, ..mission };
     mission.validate()?;
     Ok(mission)
 }

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use swath_nodes::{launch, node, strips};
+use swath_nodes::{launch, node, operate};
 
 /// Flies and operates a super-agile Earth-observing satellite that images ground strips.
 #[derive(Parser)]
@@ -17,8 +17,10 @@ struct Args {
 enum Command {
     /// Start the nodes of a mission, watch them, and leave bag, tasks and summary.
     Launch(launch::LaunchArgs),
-    /// Submit strips to a flying mission.
-    Strips(strips::StripsArgs),
+    /// Submit strips to a flying mission, ask about them, change them.
+    Strips(operate::StripsArgs),
+    /// Say what the planner may do by itself, and decide on what it proposes.
+    Planner(operate::PlannerArgs),
     /// Print the node graph as a Mermaid diagram and as a table.
     Graph,
 }
@@ -27,7 +29,8 @@ enum Command {
 fn main() -> ExitCode {
     node::exit_code(match Args::parse().command {
         Command::Launch(args) => launch::run(&args, |spec, seed| Ok(swath_training::planners::make(spec, seed)?)),
-        Command::Strips(args) => strips::run(&args),
+        Command::Strips(args) => operate::run_strips(&args),
+        Command::Planner(args) => operate::run_planner(&args),
         Command::Graph => {
             print!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table());
             Ok(())

@@ -75,6 +75,8 @@ pub struct DecisionPoint {
     pub mission_over: bool,
     /// The task that just ended.
     pub finished: Option<FinishedTask>,
+    /// The last task that imaged a strip, for those who were away when it ended.
+    pub last_imaging: Option<FinishedTask>,
 }
 
 /// What guidance does at a tick.
@@ -114,6 +116,9 @@ pub struct GuidanceLogic {
     waiting: VecDeque<StateSample>,
     latest: Option<Command>,
     torque_pending: Vector3<f64>,
+    last_imaging: Option<FinishedTask>,
+    /// Number of a task in hand that is given up at the next state.
+    aborted: Option<u64>,
     /// Tasks that did not come in time.
     pub late: u64,
 }
@@ -139,6 +144,8 @@ impl GuidanceLogic {
             waiting: VecDeque::new(),
             latest: None,
             torque_pending: Vector3::zeros(),
+            last_imaging: None,
+            aborted: None,
             late: 0,
         }
     }
@@ -201,6 +208,18 @@ impl GuidanceLogic {
         self.begin(TaskOrder { task: self.task, kind: Task::Wait { ticks: self.hold }, strip: None })
     }
 
+    /// A task is no longer wanted: it ends at the next state, unless imaging has begun. Returns whether it ends.
+    pub fn on_abort(&mut self, task: u64) -> bool {
+        let slewing = match (&self.active, &self.latest) {
+            (Some(active), Some(latest)) => active.order.task == task && !latest.guidance.imaging,
+            _ => false,
+        };
+        if slewing {
+            self.aborted = Some(task);
+        }
+        slewing
+    }
+
     fn begin(&mut self, order: TaskOrder) -> Vec<Effect> {
         let mut states = std::mem::take(&mut self.waiting);
         let Some(state) = states.pop_front() else { return Vec::new() };
@@ -214,7 +233,8 @@ impl GuidanceLogic {
     }
 
     fn process(&mut self, state: StateSample) -> Vec<Effect> {
-        let ended = self.guidance.end().is_some_and(|end| state.tick >= end);
+        let aborted = self.aborted.take().is_some_and(|task| self.may_end(task, &state));
+        let ended = aborted || self.guidance.end().is_some_and(|end| state.tick >= end);
         let over = state.tick >= self.horizon;
         let finished = if ended || over { self.finish(&state) } else { None };
         if self.active.is_some() {
@@ -237,7 +257,16 @@ impl GuidanceLogic {
             situation,
             mission_over: over,
             finished,
+            last_imaging: self.last_imaging.clone(),
         }))]
+    }
+
+    /// Whether a task is in hand whose imaging has not begun at a state.
+    fn may_end(&self, task: u64, state: &StateSample) -> bool {
+        self.active.as_ref().is_some_and(|active| match active.order.kind {
+            Task::Image { t_pre, .. } => active.order.task == task && state.tick < active.start.after(t_pre),
+            Task::Wait { .. } => false,
+        })
     }
 
     fn finish(&mut self, state: &StateSample) -> Option<FinishedTask> {
@@ -251,7 +280,11 @@ impl GuidanceLogic {
         let reward = if strip.is_some() && outcome.failure.is_none() { priority } else { 0.0 };
         let record = TaskRecord { task: order.task, start, end: state.tick, strip, t_pre, t_acq, outcome, reward };
         self.task += 1;
-        Some(FinishedTask { record, name })
+        let finished = FinishedTask { record, name };
+        if finished.record.strip.is_some() {
+            self.last_imaging = Some(finished.clone());
+        }
+        Some(finished)
     }
 
     fn fly(&mut self, state: &StateSample) -> Effect {
@@ -356,5 +389,43 @@ mod tests {
         assert_eq!(guidance.late, 1);
         let order = TaskOrder { task: 0, kind: Task::Wait { ticks: 5 }, strip: None };
         assert_eq!(guidance.on_task(order), Err(TaskError::NotWanted { task: 0, wanted: None }));
+    }
+
+    #[test]
+    fn a_task_is_given_up_while_slewing_and_not_once_imaging_has_begun() {
+        let model = model();
+        let env = Env::episode(Arc::new(model.clone()), &EpisodeConfig::evaluation(), SEED);
+        let candidate = env.context().candidates[0];
+        let initial = InitialState::draw(&model.config, &mut rng::stream(SEED, rng::INITIAL_STATE));
+        for (ticks, given_up) in [(10, true), (60, false)] {
+            let mut spacecraft = SpacecraftLogic::new(&model, &initial, Tick(1000));
+            let mut guidance = GuidanceLogic::new(model.clone(), Tick(1000), 10);
+            guidance.on_state(spacecraft.sample());
+            let kind = Task::Image { strip: candidate.strip, t_pre: 40, t_acq: candidate.t_acq };
+            let order = TaskOrder { task: 0, kind, strip: Some((candidate.id, "strip".to_owned())) };
+            guidance.on_task(order).unwrap();
+            let mut sample = |guidance: &mut GuidanceLogic| {
+                let effects = guidance.on_state(spacecraft.advance());
+                if let Some(Effect::Command(command)) = effects.first() {
+                    spacecraft.command(command.tick, command.guidance.torque).unwrap();
+                }
+                effects
+            };
+            for _ in 1..ticks {
+                sample(&mut guidance);
+            }
+            assert!(!guidance.on_abort(7), "another task");
+            assert_eq!(guidance.on_abort(0), given_up);
+            match &sample(&mut guidance)[..] {
+                [Effect::Decide(point)] => {
+                    let finished = point.finished.as_ref().unwrap();
+                    assert!(given_up);
+                    assert_eq!(finished.record.outcome, TaskOutcome::NOT_BEGUN);
+                    assert_eq!(finished.record.end, Tick(ticks));
+                    assert_eq!(point.last_imaging.as_ref(), Some(finished));
+                }
+                effects => assert!(!given_up, "{effects:?}"),
+            }
+        }
     }
 }

@@ -37,6 +37,10 @@ struct GuidanceNode {
     torques: Publisher<msg::WheelTorque>,
     points: Publisher<msg::DecisionPoint>,
     status: Publisher<msg::GuidanceStatus>,
+    phases: Publisher<msg::TaskPhase>,
+    aborts: Subscription<msg::TaskAbort>,
+    /// Task and whether it images, as they were told last.
+    phase_told: Option<(u64, bool)>,
     status_every: u64,
     deadline: Duration,
     question: Option<Question>,
@@ -66,6 +70,9 @@ impl GuidanceNode {
             torques: base.node.publisher(&graph::WHEEL_TORQUE)?,
             points: base.node.publisher(&graph::DECISION_POINT)?,
             status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
+            phases: base.node.publisher(&graph::TASK_PHASE)?,
+            aborts: base.node.subscription(&graph::TASK_ABORT)?,
+            phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             deadline: Duration::from_secs_f64(seconds),
             question: None,
@@ -74,6 +81,11 @@ impl GuidanceNode {
     }
 
     fn turn(&mut self) -> Result<()> {
+        while let Some(message) = self.aborts.take()? {
+            if self.logic.on_abort(message.task) {
+                tracing::info!("task {} is given up: {}", message.task, message.reason);
+            }
+        }
         while let Some(message) = self.states.take()? {
             match from_msg::spacecraft_state(&message) {
                 Ok(state) => {
@@ -143,9 +155,15 @@ impl GuidanceNode {
         Ok(())
     }
 
-    fn send(&self, command: &Command) -> Result<()> {
+    fn send(&mut self, command: &Command) -> Result<()> {
         self.base.set_now(command.tick);
         self.torques.publish(&to_msg::wheel_torque(&self.base.stamper, command))?;
+        let phase = (command.task, command.guidance.imaging);
+        if command.has_strip && self.phase_told != Some(phase) {
+            self.phase_told = Some(phase);
+            let strip = self.logic.strip().map_or(0, |(id, _)| id.0);
+            self.phases.publish(&to_msg::task_phase(&self.base.stamper, command, strip))?;
+        }
         if command.tick.0.is_multiple_of(self.status_every) {
             let strip = self.logic.strip().map(|(id, name)| (id.0, name.as_str()));
             self.status.publish(&to_msg::guidance_status(&self.base.stamper, command, strip))?;

@@ -1,6 +1,7 @@
 //! The processes of a mission.
 
 use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -23,6 +24,8 @@ struct Member {
     name: String,
     child: Child,
     lines: Option<Receiver<String>>,
+    /// How to start it again when it is killed.
+    revive: Option<(PathBuf, Vec<String>)>,
 }
 
 impl Fleet {
@@ -47,7 +50,16 @@ impl Fleet {
             });
             receiver
         });
-        self.members.push(Member { name: name.to_owned(), child, lines });
+        self.members.push(Member { name: name.to_owned(), child, lines, revive: None });
+        Ok(())
+    }
+
+    /// As [`Self::start`], and again whenever the process is killed: it takes up its work where it was.
+    pub fn start_and_keep(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
+        self.start(name, program, args, false)?;
+        if let Some(member) = self.members.last_mut() {
+            member.revive = Some((program_path(program), args.to_vec()));
+        }
         Ok(())
     }
 
@@ -67,11 +79,18 @@ impl Fleet {
         }
     }
 
-    /// Fails when a process has ended.
+    /// Fails when a process has ended; starts it again when it was killed and can go on.
     pub fn check(&mut self) -> Result<()> {
         for member in &mut self.members {
-            if let Some(status) = member.child.try_wait()? {
-                bail!("node {} has ended ({status}); the reason is above", member.name);
+            let Some(status) = member.child.try_wait()? else { continue };
+            match &member.revive {
+                // One that ends by itself has said why, and would do so again.
+                Some((path, args)) if status.signal().is_some() => {
+                    tracing::warn!("node {} has ended ({status}) and is started again", member.name);
+                    let start = Command::new(path).args(args).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
+                    member.child = start.with_context(|| format!("cannot start node {} again", member.name))?;
+                }
+                _ => bail!("node {} has ended ({status}); the reason is above", member.name),
             }
         }
         Ok(())

@@ -42,7 +42,10 @@ impl OutputFolder {
     pub fn write_mission(&self, mission: &Mission, requests: &[NamedRequest]) -> Result<PathBuf> {
         requests_file::write(&self.path.join("requests.geojson"), requests)?;
         let files = vec![PathBuf::from("requests.geojson")];
-        let mission = Mission { requests: MissionRequests { files, random: None }, ..mission.clone() };
+        let mission = Mission {
+            requests: MissionRequests { files, random: None, ..mission.requests.clone() },
+            ..mission.clone()
+        };
         let path = self.path.join("mission.toml");
         fs::write(&path, toml::to_string(&mission)?).with_context(|| format!("cannot write {}", path.display()))?;
         Ok(path)

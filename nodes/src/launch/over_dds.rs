@@ -36,7 +36,7 @@ pub fn fly(mission: &Mission, mission_file: &Path, output: &mut OutputFolder, re
         fleet.start(graph::RECORDER, "swath-bag", &words.map(str::to_owned), true)?;
         fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
     }
-    start_nodes(&mut fleet, mission_file, record)?;
+    start_nodes(&mut fleet, mission_file, output, record)?;
     let nodes = fleet.processes();
     let flown = launcher.watch(&mut fleet, output)?;
     // The recorder ends first: the nodes' last messages reach it while they are still there.
@@ -58,17 +58,15 @@ pub fn fly(mission: &Mission, mission_file: &Path, output: &mut OutputFolder, re
     Ok(Summary::new(inputs, &flown.totals, model.period))
 }
 
-fn start_nodes(fleet: &mut Fleet, mission_file: &Path, record: bool) -> Result<()> {
+fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, record: bool) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
     let words = |extra: &[String]| {
         let own = ["--ros-args", "-p", &mission].map(str::to_owned);
         own.into_iter().chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
-    for (name, program) in [
-        (graph::REQUEST_MANAGER, "swath-requests"),
-        (graph::PLANNER, "swath-planner"),
-        (graph::GUIDANCE, "swath-guidance"),
-    ] {
+    let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
+    fleet.start_and_keep(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
+    for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
         fleet.start(name, program, &words(&[]), false)?;
     }
     let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
@@ -203,7 +201,21 @@ impl Launcher {
 
     fn accepted(&self) -> u64 {
         self.last_summary.as_ref().map_or(0, |s| {
-            s.accepted + s.scheduled + s.executing + s.completed + s.expired + s.failed + s.fulfilled_by_link
+            [
+                s.held,
+                s.accepted,
+                s.scheduled,
+                s.executing,
+                s.completed,
+                s.cancelled_by_user,
+                s.cancelled_by_system,
+                s.expired,
+                s.failed,
+                s.superseded,
+                s.fulfilled_by_link,
+            ]
+            .iter()
+            .sum()
         })
     }
 }

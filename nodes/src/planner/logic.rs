@@ -6,6 +6,7 @@ use swath_sim::guidance::Task;
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, Rationale};
 
+use crate::approval::Gate;
 use crate::planners::GuardedPlanner;
 
 /// The candidates of a task.
@@ -40,16 +41,17 @@ pub struct Planned {
 pub struct PlannerLogic {
     model: Model,
     planner: GuardedPlanner,
+    gate: Gate,
     point: Option<(u64, Situation)>,
     upcoming: Option<Upcoming>,
     decided: Option<u64>,
 }
 
 impl PlannerLogic {
-    /// A planner node around a planner.
+    /// A planner node around a planner, which may do by itself what the gate lets through.
     #[must_use]
-    pub fn new(model: Model, planner: GuardedPlanner) -> Self {
-        Self { model, planner, point: None, upcoming: None, decided: None }
+    pub fn new(model: Model, planner: GuardedPlanner, gate: Gate) -> Self {
+        Self { model, planner, gate, point: None, upcoming: None, decided: None }
     }
 
     /// A task is wanted.
@@ -64,6 +66,23 @@ impl PlannerLogic {
         self.decide()
     }
 
+    /// What the planner may do by itself.
+    #[must_use]
+    pub fn gate(&self) -> &Gate {
+        &self.gate
+    }
+
+    /// What the planner may do by itself.
+    pub fn gate_mut(&mut self) -> &mut Gate {
+        &mut self.gate
+    }
+
+    /// Name of the planner.
+    #[must_use]
+    pub fn planner_name(&self) -> String {
+        self.planner.name()
+    }
+
     /// The candidates that the last decision rested on.
     #[must_use]
     pub fn upcoming(&self) -> Option<&Upcoming> {
@@ -76,10 +95,12 @@ impl PlannerLogic {
         if self.decided.is_some_and(|decided| decided >= task) {
             return None;
         }
-        let context =
-            DecisionContext { task, situation: &situation, candidates: &upcoming.candidates, model: &self.model };
+        let candidates = &upcoming.candidates;
+        let (gate, planner, model) = (&mut self.gate, &mut self.planner, &self.model);
+        let context = DecisionContext { task, situation: &situation, candidates, model };
         // The guarded planner's decisions are allowed ones: the heuristic waits when nothing else is left.
-        let decision = self.planner.decide(&context).ok()?;
+        let plan = |left: &[Candidate]| planner.decide(&DecisionContext { candidates: left, ..context });
+        let decision = gate.decide(situation.now, candidates, plan).ok()?;
         let kind = decision.to_task(&context).ok()?;
         self.decided = Some(task);
         Some(Planned {
@@ -103,6 +124,11 @@ mod tests {
     use swath_sim::planner::{Heuristic, PlannerError};
 
     use super::*;
+    use crate::approval::ApprovalConfig;
+
+    fn gate(model: &Model) -> Gate {
+        Gate::new(&ApprovalConfig::default(), model.period)
+    }
 
     struct Broken;
 
@@ -129,7 +155,11 @@ mod tests {
         let env = env();
         let situation = *env.context().situation;
         let make =
-            || PlannerLogic::new((**env.model()).clone(), GuardedPlanner::new(Box::new(Heuristic { t_pre_s: 90.0 })));
+            || PlannerLogic::new(
+                (**env.model()).clone(),
+                GuardedPlanner::new(Box::new(Heuristic { t_pre_s: 90.0 })),
+                gate(env.model()),
+            );
         let mut first = make();
         assert_eq!(first.on_decision_point(0, situation), None);
         let planned = first.on_upcoming(upcoming(&env, 0)).unwrap();
@@ -143,7 +173,8 @@ mod tests {
     #[test]
     fn the_heuristic_takes_over_from_a_planner_that_fails() {
         let env = env();
-        let mut logic = PlannerLogic::new((**env.model()).clone(), GuardedPlanner::new(Box::new(Broken)));
+        let planner = GuardedPlanner::new(Box::new(Broken));
+        let mut logic = PlannerLogic::new((**env.model()).clone(), planner, gate(env.model()));
         logic.on_decision_point(0, *env.context().situation);
         let planned = logic.on_upcoming(upcoming(&env, 0)).unwrap();
         assert_eq!(planned.planner, "heuristic:90");

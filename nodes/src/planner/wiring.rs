@@ -5,10 +5,12 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::Spec;
-use swath_ros::{Publisher, Subscription, graph};
+use swath_ros::{Publisher, Server, Subscription, graph};
 use swath_sim::planner::{Planner, PlannerSpec};
+use swath_sim::time::Tick;
 
 use super::logic::{Planned, PlannerLogic};
+use crate::approval::Gate;
 use crate::node::{MissionNode, Severity};
 use crate::planners::{GuardedPlanner, PlannerMaker};
 use crate::{from_msg, to_msg};
@@ -34,10 +36,15 @@ struct PlannerNode {
     upcoming: Subscription<msg::UpcomingStrips>,
     tasks: Publisher<msg::ImagingTask>,
     decisions: Publisher<msg::Decision>,
+    status: Publisher<msg::PlannerStatus>,
+    set_mode: Server<msg::SetPlannerMode>,
+    review: Server<msg::ReviewProposal>,
+    status_told: Option<msg::PlannerStatus>,
     strips: Vec<msg::Candidate>,
     last: Option<msg::ImagingTask>,
     /// Alarm to raise at the first decision point: before, nobody may be listening yet.
     missing: Option<(String, String)>,
+    now: Tick,
     base: MissionNode,
 }
 
@@ -51,7 +58,15 @@ impl PlannerNode {
             .missing()
             .map(|reason| (format!("no planner {spec}"), format!("{reason}; {} takes over", planner.name())));
         Ok(Self {
-            logic: PlannerLogic::new((*base.model).clone(), planner),
+            logic: PlannerLogic::new(
+                (*base.model).clone(),
+                planner,
+                Gate::new(&base.mission.approval, base.model.period),
+            ),
+            status: base.node.publisher(&graph::PLANNER_STATUS)?,
+            set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
+            review: base.node.server(&graph::REVIEW_PROPOSAL)?,
+            status_told: None,
             points: base.node.subscription(&graph::DECISION_POINT)?,
             upcoming: base.node.subscription(&graph::UPCOMING_STRIPS)?,
             tasks: base.node.publisher(&graph::PLANNER_TASK)?,
@@ -59,6 +74,7 @@ impl PlannerNode {
             strips: Vec::new(),
             last: None,
             missing,
+            now: Tick(0),
             base,
         })
     }
@@ -96,13 +112,55 @@ impl PlannerNode {
                 Err(error) => self.base.alarm(Severity::Error, "candidates refused", &error.to_string())?,
             }
         }
+        self.take_orders()?;
+        self.tell_status()?;
         self.base.node.wait(IDLE)?;
+        Ok(())
+    }
+
+    /// What operators say; it counts from the next decision on.
+    fn take_orders(&mut self) -> Result<()> {
+        let gate = self.logic.gate_mut();
+        self.set_mode.answer_all(|call| match from_msg::planner_mode(call.mode) {
+            Ok(mode) => {
+                tracing::info!("{} sets the mode to {mode:?}", call.actor);
+                gate.set_mode(mode);
+                msg::SetPlannerModeResponse { accepted: true, reason: String::new() }
+            }
+            Err(error) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
+        })?;
+        self.review.answer_all(|call| match gate.review(call.proposal, call.approve, &call.actor) {
+            Ok(proposal) => {
+                let verb = if call.approve { "approves" } else { "rejects" };
+                tracing::info!("{} {verb} proposal {proposal}", call.actor);
+                msg::ReviewProposalResponse { accepted: true, proposal, reason: String::new() }
+            }
+            Err(error) => msg::ReviewProposalResponse { reason: error.to_string(), ..Default::default() },
+        })?;
+        Ok(())
+    }
+
+    /// Tells the mode and the proposal when they have changed.
+    fn tell_status(&mut self) -> Result<()> {
+        let proposed = self.logic.gate().proposal().map(|proposal| proposal.candidate.id.0);
+        let known = self.status_told.as_ref().map(|status| &status.strip).filter(|strip| Some(strip.id) == proposed);
+        let offered = self.strips.iter().map(|candidate| &candidate.strip);
+        // A strip that is proposed stays known when the candidates change.
+        let strip = offered.chain(known).find(|strip| Some(strip.id) == proposed).cloned().unwrap_or_default();
+        let status = to_msg::planner_status(&self.base.stamper, self.now, &self.logic, strip);
+        let same =
+            |told: &msg::PlannerStatus| msg::PlannerStatus { header: told.header.clone(), ..status.clone() } == *told;
+        if !self.status_told.as_ref().is_some_and(same) {
+            self.status.publish(&status)?;
+            self.status_told = Some(status);
+        }
         Ok(())
     }
 
     fn publish(&mut self, planned: Option<Planned>, started: Instant) -> Result<()> {
         let (Some(planned), Some(upcoming)) = (planned, self.logic.upcoming()) else { return Ok(()) };
-        self.base.set_now(planned.situation.now);
+        self.now = planned.situation.now;
+        self.base.set_now(self.now);
         if let Some(fault) = &planned.fault {
             let text = format!("{fault}; {} takes over", planned.planner);
             self.base.alarm(Severity::Error, "planner failed", &text)?;

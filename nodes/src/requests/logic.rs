@@ -1,111 +1,24 @@
-//! The request manager without ROS: every strip ever requested, what is upcoming, what is fulfilled.
+//! The request manager without ROS and without its store: every strip ever requested, what is upcoming, what is
+//! fulfilled.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use swath_sim::catalogue::{Candidate, Catalogue, StripState};
+use swath_sim::catalogue::{Candidate, Catalogue, Entry as Listed, Prepared};
 use swath_sim::env::{TaskRecord, windows_until};
-use swath_sim::error::StripError;
-use swath_sim::guidance::FailureReason;
+use swath_sim::flight::Situation;
 use swath_sim::model::Model;
 use swath_sim::orbit::Orbit;
 use swath_sim::scenario::InitialState;
 use swath_sim::strip::StripId;
 use swath_sim::time::Tick;
-use thiserror::Error;
+use swath_sim::windows::Window;
 
+use super::index::Index;
+use super::intake::{Place, place};
+use super::journal::{Change, Entry, InFlight, Progress, Standing};
+use super::lifecycle::State;
+use super::refusal::{Refusal, check_text};
 use crate::requests_file::NamedRequest;
-
-/// Why a request is refused.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum Refusal {
-    /// The strip cannot be flown.
-    #[error(transparent)]
-    Strip(#[from] StripError),
-    /// A text is too long.
-    #[error("{field} has {length} characters, the limit is {TEXT_MAX}")]
-    Text {
-        /// Field of the request.
-        field: &'static str,
-        /// Its length.
-        length: usize,
-    },
-    /// The reference is known with other contents.
-    #[error("client_ref `{client_ref}` is known with other contents")]
-    Duplicate {
-        /// The reference.
-        client_ref: String,
-    },
-    /// There are too many requests in one call.
-    #[error("{count} requests in one call, the limit is {max}")]
-    Batch {
-        /// Requests in the call.
-        count: usize,
-        /// Most allowed.
-        max: usize,
-    },
-    /// There are too many strips.
-    #[error("{count} strips are held, the limit is {CAPACITY}")]
-    Capacity {
-        /// Strips held.
-        count: usize,
-    },
-}
-
-impl Refusal {
-    /// Stable number of the reason: the REASON constants of `swath_msgs/msg/StripStatus`.
-    #[must_use]
-    pub fn code(&self) -> u16 {
-        match self {
-            Self::Strip(error) => error.code(),
-            Self::Text { .. } => 107,
-            Self::Duplicate { .. } => 108,
-            Self::Capacity { .. } | Self::Batch { .. } => 109,
-        }
-    }
-}
-
-/// Longest name or reference [characters].
-const TEXT_MAX: usize = 256;
-/// Most strips held.
-const CAPACITY: usize = 1_000_000;
-
-/// Where a strip stands (DDS states of `swath_msgs/msg/StripStatus`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Standing {
-    /// Refused.
-    Rejected,
-    /// In the catalogue.
-    Accepted,
-    /// Chosen as the next task.
-    Scheduled,
-    /// Imaged.
-    Completed,
-    /// No opportunity is left.
-    Expired,
-    /// Its twin was imaged.
-    FulfilledByLink,
-}
-
-/// A change of a strip's standing.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Change {
-    /// The strip; 0 for a request that was refused.
-    pub id: StripId,
-    /// What was asked for.
-    pub request: NamedRequest,
-    /// Where it stands now.
-    pub standing: Standing,
-    /// Reason code and text; 0 and empty without one.
-    pub reason: (u16, String),
-    /// When.
-    pub tick: Tick,
-    /// Attempts so far.
-    pub attempts: u32,
-    /// Reward earned.
-    pub reward: f64,
-    /// Its twin.
-    pub linked: Option<StripId>,
-}
 
 /// What the planner is offered for a task.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,309 +35,458 @@ pub struct Offer {
     pub fulfilled: usize,
 }
 
-#[derive(Clone, Debug)]
-struct Held {
-    named: NamedRequest,
-    standing: Standing,
-    attempts: u32,
-    reward: f64,
+/// A task that guidance should give up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Abort {
+    /// Number of the task.
+    pub task: u64,
+    /// The strip.
+    pub id: StripId,
 }
+
+/// What an operator decides on a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Review {
+    /// A held request is accepted.
+    Release,
+    /// A held request is refused.
+    Reject,
+    /// An accepted request is held.
+    Hold,
+}
+
+/// A request that has a number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// What was asked for.
+    pub named: NamedRequest,
+    /// Where it stands.
+    pub state: State,
+    /// Why: code and text; 0 and empty without a reason.
+    pub reason: (u16, String),
+    /// Who brought it there.
+    pub actor: String,
+    /// When it was taken.
+    pub created: Tick,
+    /// When it changed last.
+    pub changed: Tick,
+    /// What it has gone through.
+    pub standing: Standing,
+    /// The request that it replaces.
+    pub supersedes: Option<StripId>,
+}
+
+/// A request as the store gives it back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stored {
+    /// The request.
+    pub request: Request,
+    /// Its start windows.
+    pub windows: Vec<Window>,
+    /// The same strip scanned the other way.
+    pub linked: Option<StripId>,
+}
+
+/// What a mission says of its requests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rules {
+    /// Simulated time of the epoch [ns since 1970-01-01 UTC].
+    pub epoch_ns: u64,
+    /// Attempts that count before a request fails, for requests that do not say.
+    pub max_attempts: u32,
+}
+
+/// Name of the request manager in the history.
+pub const SYSTEM: &str = "request_manager";
+/// Name of guidance in the history.
+pub(super) const GUIDANCE: &str = "guidance";
+/// Name of the planner in the history.
+const PLANNER: &str = "planner";
 
 /// The request manager's state.
 #[derive(Clone, Debug)]
 pub struct RequestLogic {
-    model: Model,
-    catalogue: Catalogue,
-    held: Vec<Held>,
-    by_client_ref: BTreeMap<String, StripId>,
-    rejected: usize,
-    now: Tick,
-    /// Tasks below this number are settled.
-    settled: u64,
-    changes: Vec<Change>,
+    pub(super) model: Model,
+    pub(super) catalogue: Catalogue,
+    pub(super) index: Index,
+    pub(super) requests: Vec<Request>,
+    pub(super) by_state: BTreeMap<State, BTreeSet<StripId>>,
+    pub(super) situation: Option<Situation>,
+    pub(super) rules: Rules,
+    pub(super) by_reference: HashMap<(String, String), StripId>,
+    pub(super) by_place: HashMap<Place, Vec<StripId>>,
+    pub(super) rejected: usize,
+    pub(super) reward: f64,
+    pub(super) progress: Progress,
+    pub(super) journal: Vec<Entry>,
+    pub(super) aborts: Vec<Abort>,
 }
 
 impl RequestLogic {
     /// A request manager at the epoch of a mission that ends at `horizon`.
     #[must_use]
-    pub fn new(model: Model, initial: &InitialState, horizon: Tick) -> Self {
+    pub fn new(model: Model, initial: &InitialState, horizon: Tick, rules: Rules) -> Self {
         let orbit = Orbit::new(&model.config, initial.orbit, model.period);
         let catalogue = Catalogue::new(&model, &orbit, windows_until(&model, horizon));
         Self {
             model,
             catalogue,
-            held: Vec::new(),
-            by_client_ref: BTreeMap::new(),
+            index: Index::default(),
+            requests: Vec::new(),
+            by_state: BTreeMap::new(),
+            situation: None,
+            rules,
+            by_reference: HashMap::new(),
+            by_place: HashMap::new(),
             rejected: 0,
-            now: Tick(0),
-            settled: 0,
-            changes: Vec::new(),
+            reward: 0.0,
+            progress: Progress::default(),
+            journal: Vec::new(),
+            aborts: Vec::new(),
         }
     }
 
-    /// Takes a request. The same one again under the same reference gets the identity that it has.
+    /// Takes up what the store has: requests in the order of their numbers, how many were refused, how far the mission
+    /// has come.
+    ///
+    /// # Errors
+    /// When a stored request is no strip: it was stored for a mission with other limits.
+    pub fn restore(&mut self, stored: Vec<Stored>, rejected: usize, progress: Progress) -> Result<(), Refusal> {
+        self.rejected = rejected;
+        self.progress = progress;
+        let links: Vec<_> = stored.iter().map(|stored| stored.linked).collect();
+        for Stored { request, windows, .. } in stored {
+            let strip =
+                request.named.request.to_strip(&self.model.config.requests, self.model.config.earth.radius_m)?;
+            let t_acq = strip.acquisition_ticks(self.model.period);
+            self.reward += request.standing.reward;
+            self.insert(Prepared { strip, t_acq, windows }, request);
+        }
+        for (id, linked) in (1..).map(StripId).zip(links) {
+            if let Some(linked) = linked {
+                self.catalogue.link(id, linked);
+            }
+            match self.requests[id.0 as usize - 1].state {
+                State::Held => {
+                    self.catalogue.hold(id);
+                }
+                state if state.is_final() => {
+                    self.catalogue.remove(id);
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a request. The same one again under the same reference of the same submitter gets the number that it has.
     ///
     /// # Errors
     /// Why it is refused.
     pub fn submit(&mut self, named: NamedRequest) -> Result<StripId, Refusal> {
-        let result = self.accept(&named);
+        let result = self.take_in(&named, None);
         if let Err(refusal) = &result {
-            self.rejected += 1;
-            let reason = (refusal.code(), refusal.to_string());
-            self.changes.push(Change {
-                id: StripId(0),
-                request: named,
-                standing: Standing::Rejected,
-                reason,
-                tick: self.now,
-                attempts: 0,
-                reward: 0.0,
-                linked: None,
-            });
+            self.note_refusal(named, refusal);
         }
         result
     }
 
-    fn accept(&mut self, named: &NamedRequest) -> Result<StripId, Refusal> {
-        for (field, text) in [("name", &named.name), ("client_ref", &named.client_ref)] {
-            let length = text.chars().count();
-            if length > TEXT_MAX {
-                return Err(Refusal::Text { field, length });
-            }
-        }
-        if let Some(&id) = self.by_client_ref.get(&named.client_ref) {
-            let known = &self.held[id.0 as usize - 1].named;
-            return if known == named {
-                Ok(id)
-            } else {
-                Err(Refusal::Duplicate { client_ref: named.client_ref.clone() })
-            };
-        }
-        if self.held.len() >= CAPACITY {
-            return Err(Refusal::Capacity { count: self.held.len() });
-        }
-        let id = self.catalogue.add(&self.model, &named.request, self.now)?;
-        if !named.client_ref.is_empty() {
-            self.by_client_ref.insert(named.client_ref.clone(), id);
-        }
-        // A bidirectional request has a twin, known by the same names.
-        for number in self.held.len()..self.catalogue.len() {
-            let request =
-                if StripId(number as u64 + 1) == id { named.request.clone() } else { named.request.reversed() };
-            let named = NamedRequest { request, ..named.clone() };
-            self.held.push(Held { named, standing: Standing::Accepted, attempts: 0, reward: 0.0 });
-            self.note(StripId(number as u64 + 1), (0, String::new()));
-        }
-        Ok(id)
+    /// As [`Self::submit`], for a request that came at an earlier tick: its windows are sought from there.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub fn submit_since(&mut self, named: NamedRequest, since: Tick) -> Result<StripId, Refusal> {
+        let now = std::mem::replace(&mut self.progress.now, since);
+        let result = self.submit(named);
+        self.progress.now = now;
+        result
     }
 
-    /// A task is wanted at `now`; `finished` is the one that just ended. Answers with the candidates.
-    pub fn on_decision_point(&mut self, task: u64, now: Tick, finished: Option<&TaskRecord>) -> Offer {
-        self.now = self.now.max(now);
-        if let Some(record) = finished
-            && record.task >= self.settled
-        {
-            self.settled = record.task + 1;
-            self.settle(record);
+    /// Takes a request in place of another one.
+    ///
+    /// # Errors
+    /// Why it is refused; the other one stays as it is then.
+    pub fn replace(&mut self, old: StripId, named: NamedRequest) -> Result<StripId, Refusal> {
+        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old)));
+        let new = match result {
+            Ok(new) => new,
+            Err(refusal) => {
+                self.note_refusal(named, &refusal);
+                return Err(refusal);
+            }
+        };
+        let (actor, text) = (named.submitter, format!("replaced by request {}", new.0));
+        for id in self.both_ways(old, State::Superseded)? {
+            self.requests[id.0 as usize - 1].standing.superseded_by = Some(new);
+            self.leave(id, State::Superseded, (0, text.clone()), &actor)?;
+        }
+        Ok(new)
+    }
+
+    /// Takes a request back.
+    ///
+    /// # Errors
+    /// When there is no such request, or imaging has begun.
+    pub fn cancel(&mut self, id: StripId, actor: &str, reason: &str) -> Result<(), Refusal> {
+        check_text("actor", actor)?;
+        check_text("reason", reason)?;
+        for id in self.both_ways(id, State::CancelledByUser)? {
+            self.leave(id, State::CancelledByUser, (0, reason.to_owned()), actor)?;
+        }
+        Ok(())
+    }
+
+    /// Decides on a held request, or holds an accepted one.
+    ///
+    /// # Errors
+    /// When there is no such request, or its state does not allow it.
+    pub fn review(&mut self, id: StripId, review: Review, actor: &str, reason: &str) -> Result<(), Refusal> {
+        check_text("actor", actor)?;
+        check_text("reason", reason)?;
+        let to = match review {
+            Review::Release => State::Accepted,
+            Review::Reject => State::Rejected,
+            Review::Hold => State::Held,
+        };
+        // A release is for held requests only, although the life cycle has other ways to be accepted.
+        if review == Review::Release && self.known(id)?.state != State::Held {
+            let illegal = super::lifecycle::IllegalTransition { from: self.known(id)?.state, to };
+            return Err(Refusal::State { id: id.0, illegal });
+        }
+        for id in self.both_ways(id, to)? {
+            match review {
+                Review::Release => {
+                    self.catalogue.release(id);
+                    self.stand(id, to, (0, reason.to_owned()), actor)?;
+                }
+                Review::Hold => {
+                    self.catalogue.hold(id);
+                    self.stand(id, to, (0, reason.to_owned()), actor)?;
+                    self.abort_if_under_way(id);
+                }
+                Review::Reject => self.leave(id, to, (0, reason.to_owned()), actor)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// A task is wanted at `now`; `results` are those of tasks that have ended, also ones that are known. Answers with
+    /// the candidates.
+    pub fn on_decision_point(&mut self, task: u64, now: Tick, results: &[TaskRecord]) -> Offer {
+        self.progress.now = self.progress.now.max(now);
+        for record in results {
+            if record.strip.is_some() && record.task >= self.progress.settled {
+                self.progress.settled = record.task + 1;
+                self.settle(record);
+            }
+        }
+        if let Some(flown) = self.progress.in_flight.filter(|flown| flown.task < task) {
+            self.progress.in_flight = None;
+            self.not_flown(flown.id);
         }
         let mut candidates = Vec::new();
         let count = self.model.config.planning.candidates;
-        for id in self.catalogue.next(self.now, count, &mut candidates) {
-            self.stand(id, Standing::Expired, (0, String::new()));
+        for id in self.catalogue.next(self.progress.now, count, &mut candidates) {
+            self.not_flown(id);
+            // The catalogue has none but accepted and held requests now.
+            let _ = self.stand(id, State::Expired, (0, "its last window has closed".to_owned()), SYSTEM);
         }
-        Offer { task, tick: self.now, candidates, pending: self.catalogue.pending(), fulfilled: self.fulfilled() }
+        Offer {
+            task,
+            tick: self.progress.now,
+            candidates,
+            pending: self.catalogue.pending(),
+            fulfilled: self.count(State::Completed),
+        }
     }
 
-    /// A strip was chosen as the next task.
-    pub fn on_task(&mut self, id: StripId) {
-        if self.standing(id) == Some(Standing::Accepted) {
-            self.stand(id, Standing::Scheduled, (0, String::new()));
-        }
+    /// What is known of the satellite at the last decision point; previews predict transitions from there.
+    pub fn set_situation(&mut self, situation: Situation) {
+        self.situation = Some(situation);
     }
 
-    fn settle(&mut self, record: &TaskRecord) {
-        let Some(id) = record.strip else { return };
-        let Some(held) = held_mut(&mut self.held, id) else { return };
-        held.attempts += 1;
-        let Some(failure) = record.outcome.failure else {
-            held.reward += record.reward;
-            if self.catalogue.fulfil(id).is_some() {
-                self.stand(id, Standing::Completed, (0, String::new()));
-                self.settle_twin(id);
-            }
+    /// A strip was chosen as the next task. A choice that came too late for a change of the request is given up.
+    pub fn on_task(&mut self, flown: InFlight) {
+        let known = self.progress.in_flight.is_some_and(|under_way| under_way.task >= flown.task);
+        if flown.task < self.progress.settled || known {
             return;
-        };
-        let reason = match failure {
-            FailureReason::Attitude => (201, "the attitude error exceeded its limit while imaging".to_owned()),
-            FailureReason::Elevation => (202, "the satellite was too low over the target while imaging".to_owned()),
-            FailureReason::Interrupted => (203, "the task was cut short".to_owned()),
-        };
-        if matches!(self.standing(id), Some(Standing::Scheduled | Standing::Accepted)) {
-            self.stand(id, Standing::Accepted, reason);
+        }
+        let Ok(request) = self.known(flown.id) else { return };
+        if request.state != State::Accepted {
+            self.aborts.push(Abort { task: flown.task, id: flown.id });
+            return;
+        }
+        self.progress.in_flight = Some(flown);
+        self.requests[flown.id.0 as usize - 1].standing.imaging = flown.start.after(flown.t_pre);
+        let _ = self.stand(flown.id, State::Scheduled, (0, String::new()), PLANNER);
+    }
+
+    /// Imaging of a task has begun.
+    pub fn on_imaging(&mut self, task: u64, tick: Tick) {
+        let Some(flown) = self.progress.in_flight.filter(|flown| flown.task == task) else { return };
+        self.progress.now = self.progress.now.max(tick);
+        if self.state(flown.id) == Some(State::Scheduled) {
+            let _ = self.stand(flown.id, State::Executing, (0, String::new()), GUIDANCE);
         }
     }
 
-    fn settle_twin(&mut self, id: StripId) {
-        let twin = self.catalogue.get(id).and_then(|entry| entry.linked);
-        let by_link =
-            |twin: &StripId| self.catalogue.get(*twin).is_some_and(|entry| entry.state == StripState::FulfilledByLink);
-        if let Some(twin) = twin.filter(by_link) {
-            self.stand(twin, Standing::FulfilledByLink, (0, String::new()));
-        }
+    /// Lines of the journal since the last call.
+    pub fn take_journal(&mut self) -> Vec<Entry> {
+        std::mem::take(&mut self.journal)
     }
 
-    fn stand(&mut self, id: StripId, standing: Standing, reason: (u16, String)) {
-        if let Some(held) = held_mut(&mut self.held, id) {
-            held.standing = standing;
-            self.note(id, reason);
-        }
+    /// Tasks to give up since the last call.
+    pub fn take_aborts(&mut self) -> Vec<Abort> {
+        std::mem::take(&mut self.aborts)
     }
 
-    fn note(&mut self, id: StripId, reason: (u16, String)) {
-        let Some(held) = self.held.get(id.0 as usize - 1) else { return };
-        self.changes.push(Change {
-            id,
-            request: held.named.clone(),
-            standing: held.standing,
-            reason,
-            tick: self.now,
-            attempts: held.attempts,
-            reward: held.reward,
-            linked: self.catalogue.get(id).and_then(|entry| entry.linked),
-        });
-    }
-
-    /// Changes since the last call.
-    pub fn take_changes(&mut self) -> Vec<Change> {
-        std::mem::take(&mut self.changes)
-    }
-
-    /// Where a strip stands.
+    /// Where a request stands.
     #[must_use]
-    pub fn standing(&self, id: StripId) -> Option<Standing> {
-        self.held.get(usize::try_from(id.0.checked_sub(1)?).ok()?).map(|held| held.standing)
+    pub fn state(&self, id: StripId) -> Option<State> {
+        self.request(id).map(|request| request.state)
     }
 
-    /// What was asked for under an identity.
+    /// A request by its number.
     #[must_use]
-    pub fn request(&self, id: StripId) -> Option<&NamedRequest> {
-        self.held.get(usize::try_from(id.0.checked_sub(1)?).ok()?).map(|held| &held.named)
+    pub fn request(&self, id: StripId) -> Option<&Request> {
+        self.requests.get(usize::try_from(id.0.checked_sub(1)?).ok()?)
     }
 
-    /// Strips imaged, and how many stand where; the refused ones are counted too.
+    /// A request by its number.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn known(&self, id: StripId) -> Result<&Request, Refusal> {
+        self.request(id).ok_or(Refusal::Unknown { id: id.0, last: self.requests.len() as u64 })
+    }
+
+    /// The request of a submitter under a reference.
     #[must_use]
-    pub fn counts(&self) -> BTreeMap<Standing, usize> {
-        let mut counts = BTreeMap::from([(Standing::Rejected, self.rejected)]);
-        for held in &self.held {
-            *counts.entry(held.standing).or_default() += 1;
-        }
-        counts
+    pub fn by_reference(&self, submitter: &str, client_ref: &str) -> Option<StripId> {
+        self.by_reference.get(&(submitter.to_owned(), client_ref.to_owned())).copied()
+    }
+
+    /// A strip with its windows.
+    #[must_use]
+    pub fn strip(&self, id: StripId) -> Option<&Listed> {
+        self.catalogue.get(id)
+    }
+
+    /// Requests that have a number.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.requests.len()
+    }
+
+    /// Whether no request has a number.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.requests.is_empty()
+    }
+
+    /// How many requests are in a state; those refused at once are counted too.
+    #[must_use]
+    pub fn count(&self, state: State) -> usize {
+        let refused = if state == State::Rejected { self.rejected } else { 0 };
+        refused + self.by_state.get(&state).map_or(0, BTreeSet::len)
     }
 
     /// Reward earned so far.
     #[must_use]
     pub fn reward(&self) -> f64 {
-        self.held.iter().map(|held| held.reward).sum()
+        self.reward
     }
 
-    /// Simulated time of the last decision.
+    /// How far the mission has come.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    /// Simulated time as far as it is known here.
     #[must_use]
     pub fn now(&self) -> Tick {
-        self.now
+        self.progress.now
     }
 
-    fn fulfilled(&self) -> usize {
-        self.held.iter().filter(|held| held.standing == Standing::Completed).count()
-    }
-}
-
-fn held_mut(held: &mut [Held], id: StripId) -> Option<&mut Held> {
-    held.get_mut(usize::try_from(id.0.checked_sub(1)?).ok()?)
-}
-
-/// A request for tests and examples: a strip of 250 km near the equator.
-#[cfg(test)]
-pub fn equatorial_request(client_ref: &str, longitude_deg: f64) -> NamedRequest {
-    NamedRequest {
-        client_ref: client_ref.to_owned(),
-        name: client_ref.to_owned(),
-        request: swath_sim::strip::StripRequest {
-            start_latitude_deg: 5.0,
-            start_longitude_deg: longitude_deg,
-            end_latitude_deg: 6.0,
-            end_longitude_deg: longitude_deg + 2.0,
-            priority: 0.5,
-            acquisition_speed_m_s: 3000.0,
-            bidirectional: false,
-        },
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use swath_sim::config::SimConfig;
-    use swath_sim::guidance::TaskOutcome;
-    use swath_sim::rng;
-
-    use super::*;
-
-    fn logic() -> RequestLogic {
-        let model = Model::new(SimConfig::default()).unwrap();
-        let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
-        RequestLogic::new(model, &initial, Tick(172_800))
+    /// What the mission says of its requests.
+    #[must_use]
+    pub fn rules(&self) -> Rules {
+        self.rules
     }
 
-    fn record(task: u64, id: StripId, failure: Option<FailureReason>) -> TaskRecord {
-        let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_elevation: 0.5 };
-        let reward = if failure.is_none() { 0.5 } else { 0.0 };
-        TaskRecord { task, start: Tick(0), end: Tick(300), strip: Some(id), t_pre: 100, t_acq: 200, outcome, reward }
+    /// A request and its twin, those of them that can go to a state; the request itself must.
+    pub(super) fn both_ways(&self, id: StripId, to: State) -> Result<Vec<StripId>, Refusal> {
+        let may = |id: StripId| {
+            let step = self.known(id)?.state.step(to);
+            step.map_err(|illegal| Refusal::State { id: id.0, illegal })
+        };
+        may(id)?;
+        let twin = self.catalogue.get(id).and_then(|entry| entry.linked);
+        match twin.filter(|&twin| self.state(twin).is_some_and(|state| !state.is_final())) {
+            // Of two twins one may be under way: what is done to the other is done to it, or to neither.
+            Some(twin) if self.state(twin) == Some(State::Executing) => Err(may(twin).err().unwrap_or(Refusal::Empty)),
+            Some(twin) if may(twin).is_ok() => Ok(vec![id, twin]),
+            _ => Ok(vec![id]),
+        }
     }
 
-    #[test]
-    fn the_same_request_again_is_the_same_strip_and_another_under_its_name_is_refused() {
-        let mut logic = logic();
-        let id = logic.submit(equatorial_request("a", 10.0)).unwrap();
-        assert_eq!(logic.submit(equatorial_request("a", 10.0)), Ok(id));
-        assert_eq!(logic.submit(equatorial_request("a", 20.0)).unwrap_err().code(), 108);
-        let standings: Vec<_> = logic.take_changes().iter().map(|change| change.standing).collect();
-        assert_eq!(standings, [Standing::Accepted, Standing::Rejected]);
+    /// A request leaves for good.
+    fn leave(&mut self, id: StripId, to: State, reason: (u16, String), actor: &str) -> Result<(), Refusal> {
+        self.stand(id, to, reason, actor)?;
+        self.catalogue.remove(id);
+        self.forget_place(id);
+        self.abort_if_under_way(id);
+        Ok(())
     }
 
-    #[test]
-    fn a_failed_strip_is_offered_again_and_an_imaged_one_is_not() {
-        let mut logic = logic();
-        let id = logic.submit(equatorial_request("a", 10.0)).unwrap();
-        logic.on_task(id);
-        assert_eq!(logic.standing(id), Some(Standing::Scheduled));
-        let offer = logic.on_decision_point(1, Tick(300), Some(&record(0, id, Some(FailureReason::Attitude))));
-        assert_eq!(offer.candidates.len(), 1);
-        logic.on_task(id);
-        let offer = logic.on_decision_point(2, Tick(600), Some(&record(1, id, None)));
-        logic.on_decision_point(2, Tick(600), Some(&record(1, id, None)));
-        assert!(offer.candidates.is_empty());
-        assert_eq!((offer.pending, offer.fulfilled), (0, 1));
-        let changes = logic.take_changes();
-        let last = changes.last().unwrap();
-        assert_eq!((last.standing, last.attempts, last.reward), (Standing::Completed, 2, 0.5));
-        assert_eq!(changes[2].reason.0, 201);
+    pub(super) fn forget_place(&mut self, id: StripId) {
+        let Some(key) = self.request(id).map(|request| place(&request.named.request)) else { return };
+        if let Some(there) = self.by_place.get_mut(&key) {
+            there.retain(|&other| other != id);
+            if there.is_empty() {
+                self.by_place.remove(&key);
+            }
+        }
     }
 
-    #[test]
-    fn twins_are_fulfilled_together() {
-        let mut logic = logic();
-        let mut named = equatorial_request("a", 10.0);
-        named.request.bidirectional = true;
-        let id = logic.submit(named).unwrap();
-        logic.on_decision_point(1, Tick(300), Some(&record(0, id, None)));
-        assert_eq!(logic.standing(StripId(2)), Some(Standing::FulfilledByLink));
-        assert_eq!(logic.counts()[&Standing::FulfilledByLink], 1);
+    fn abort_if_under_way(&mut self, id: StripId) {
+        if let Some(flown) = self.progress.in_flight.filter(|flown| flown.id == id) {
+            self.aborts.push(Abort { task: flown.task, id });
+        }
     }
 
-    #[test]
-    fn texts_are_limited() {
-        let mut logic = logic();
-        let mut named = equatorial_request("a", 10.0);
-        named.name = "x".repeat(10_000_000);
-        assert_eq!(logic.submit(named).unwrap_err().code(), 107);
+    /// The one place where a request that has a number changes its state.
+    pub(super) fn stand(&mut self, id: StripId, to: State, reason: (u16, String), actor: &str) -> Result<(), Refusal> {
+        let state = self.known(id)?.state.step(to).map_err(|illegal| Refusal::State { id: id.0, illegal })?;
+        let now = self.now();
+        let request = &mut self.requests[id.0 as usize - 1];
+        let before = std::mem::replace(&mut request.state, state);
+        request.reason = reason;
+        actor.clone_into(&mut request.actor);
+        request.changed = now;
+        if let Some(set) = self.by_state.get_mut(&before) {
+            set.remove(&id);
+        }
+        self.by_state.entry(state).or_default().insert(id);
+        if state == State::Expired {
+            self.forget_place(id);
+        }
+        self.note(id);
+        Ok(())
+    }
+
+    pub(super) fn note(&mut self, id: StripId) {
+        let Some(request) = self.request(id) else { return };
+        let change = Change {
+            id,
+            state: request.state,
+            reason: request.reason.clone(),
+            actor: request.actor.clone(),
+            tick: request.changed,
+            standing: request.standing.clone(),
+            refused: None,
+        };
+        self.journal.push(Entry::Changed(change));
     }
 }

@@ -1,142 +1,299 @@
-//! The request manager's topics, service and store of offers.
+//! The request manager's topics, and what waits until it is on disk.
 
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use swath_msgs::swath_msgs as msg;
-use swath_ros::{Publisher, Server, Subscription, graph};
+use swath_ros::{Publisher, RequestId, Spec, Subscription, graph};
 use swath_sim::strip::StripId;
 use swath_sim::time::Tick;
 
-use super::logic::{Refusal, RequestLogic};
+use super::desk::Desk;
+use super::journal::{Entry, Progress};
+use super::logic::{Abort, RequestLogic};
+use super::refusal::Refusal;
+use super::store::{Durability, Store};
+use super::writer::Writer;
+use crate::from_msg::requests as take;
 use crate::node::{MissionNode, Severity};
-use crate::requests_file::NamedRequest;
+use crate::to_msg::requests as tell;
 use crate::{from_msg, to_msg};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
-/// Most requests in one call of the service.
-const BATCH_MAX: usize = 100_000;
+/// Requests of long calls that are taken before the mission is looked at again.
+const SLICE: usize = 100;
 
 /// Runs the request manager until it is asked to end.
 ///
 /// # Errors
-/// When the node cannot come up, the mission's requests cannot be read, or DDS fails.
+/// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
 pub fn run() -> Result<()> {
     let mut node = RequestNode::new(MissionNode::start(graph::REQUEST_MANAGER)?)?;
-    while !node.base.shutdown.asked() {
-        node.turn()?;
+    let outcome = node.fly();
+    let RequestNode { mut writer, reader, .. } = node;
+    // The last connection to close the store leaves one file.
+    drop(reader);
+    // What was taken is written, also when the node ends on an error.
+    writer.finish()?;
+    outcome
+}
+
+/// What goes out once a batch of the journal is written.
+pub(super) enum Outgoing {
+    /// The candidates of a task.
+    Offer(Box<msg::UpcomingStrips>),
+    /// Changes.
+    News(Arc<Vec<Entry>>),
+    /// How many requests stand where, when the mission is over.
+    Summary,
+    /// Answers of the services.
+    Submitted(RequestId, msg::SubmitStripsResponse),
+    Cancelled(RequestId, msg::CancelStripsResponse),
+    Replaced(RequestId, msg::ReplaceStripResponse),
+    Reviewed(RequestId, msg::ReviewStripsResponse),
+    /// Questions that are answered from the store.
+    Get(RequestId, msg::GetStripRequest),
+    History(RequestId, msg::ListHistoryRequest),
+}
+
+impl Outgoing {
+    /// Answers promise more than the mission's own bookkeeping.
+    fn durability(&self) -> Durability {
+        match self {
+            Self::Submitted(..) | Self::Cancelled(..) | Self::Replaced(..) | Self::Reviewed(..) => Durability::Machine,
+            _ => Durability::Process,
+        }
     }
-    Ok(())
 }
 
 struct RequestNode {
     logic: RequestLogic,
+    desk: Desk,
     points: Subscription<msg::DecisionPoint>,
     tasks: Subscription<msg::ImagingTask>,
+    phases: Subscription<msg::TaskPhase>,
     requests: Subscription<msg::StripRequest>,
-    submit: Server<msg::SubmitStrips>,
     upcoming: Publisher<msg::UpcomingStrips>,
     events: Publisher<msg::StripStatus>,
     summary: Publisher<msg::RequestSummary>,
+    aborts: Publisher<msg::TaskAbort>,
     last: Option<msg::UpcomingStrips>,
+    /// What goes out when the batch of its number is written.
+    outbox: VecDeque<(u64, Outgoing)>,
+    /// Changes that nobody could have heard of yet.
+    unheard: Vec<Arc<Vec<Entry>>>,
+    written: Progress,
+    writer: Writer,
+    reader: Store,
     base: MissionNode,
+    /// Removed when the node ends.
+    _temporary: Option<tempfile::TempDir>,
 }
 
 impl RequestNode {
     fn new(base: MissionNode) -> Result<Self> {
+        let spec = Spec::new("store", String::new(), "Path of the store (SQLite); empty for one that does not last.");
+        let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
         base.node.parameters().check_given()?;
-        let mut logic = RequestLogic::new((*base.model).clone(), &base.mission.initial(), base.horizon);
-        let requests = base.mission.initial_requests()?;
-        let total = requests.len();
-        let accepted = requests.into_iter().filter_map(|request| logic.submit(request).ok()).count();
-        tracing::info!("{accepted} of the {total} strips known from the start are accepted");
+        let (path, temporary) = if path.as_os_str().is_empty() {
+            tracing::warn!("requests do not outlast this process: parameter `store` is not set");
+            let folder = tempfile::tempdir().context("cannot make a temporary store")?;
+            (folder.path().join("requests.sqlite"), Some(folder))
+        } else {
+            (path, None)
+        };
+        let mut store = Store::open(&path, &base.mission.identity())?;
+        let reader = Store::open_read_only(&path)?;
+        let logic = take_up(&base, &mut store)?;
         Ok(Self {
-            logic,
+            desk: Desk::new(&base.node)?,
             points: base.node.subscription(&graph::DECISION_POINT)?,
             tasks: base.node.subscription(&graph::PLANNER_TASK)?,
+            phases: base.node.subscription(&graph::TASK_PHASE)?,
             requests: base.node.subscription(&graph::STRIP_REQUEST)?,
-            submit: base.node.server(&graph::SUBMIT_STRIPS)?,
             upcoming: base.node.publisher(&graph::UPCOMING_STRIPS)?,
             events: base.node.publisher(&graph::STRIP_EVENTS)?,
             summary: base.node.publisher(&graph::REQUEST_SUMMARY)?,
+            aborts: base.node.publisher(&graph::TASK_ABORT)?,
             last: None,
+            outbox: VecDeque::new(),
+            unheard: Vec::new(),
+            written: logic.progress(),
+            writer: Writer::start(store, base.node.signal().clone()),
+            reader,
+            logic,
             base,
+            _temporary: temporary,
         })
     }
 
+    fn fly(&mut self) -> Result<()> {
+        while !self.base.shutdown.asked() {
+            self.turn()?;
+        }
+        Ok(())
+    }
+
     fn turn(&mut self) -> Result<()> {
+        let mut outgoing = Vec::new();
         while let Some(point) = self.points.take()? {
-            self.offer(&point)?;
+            outgoing.extend(self.offer(&point)?.map(|offer| Outgoing::Offer(Box::new(offer))));
+            if point.mission_over {
+                outgoing.push(Outgoing::Summary);
+            }
         }
         while let Some(task) = self.tasks.take()? {
-            if task.kind == msg::ImagingTask::KIND_IMAGE {
-                self.logic.on_task(StripId(task.strip.id));
+            if let Some(flown) = take::in_flight(&task) {
+                self.logic.on_task(flown);
+            }
+        }
+        while let Some(phase) = self.phases.take()? {
+            if phase.phase == msg::WheelTorque::PHASE_IMAGING {
+                self.logic.on_imaging(phase.task, Tick(phase.tick));
             }
         }
         while let Some(request) = self.requests.take()? {
-            if let Err(refusal) = self.logic.submit(from_msg::named_request(&request)) {
+            if let Err(refusal) = self.logic.submit(take::named_request(&request)) {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
-        let logic = &mut self.logic;
-        self.submit.answer_all(|call| answer(logic, call))?;
-        // Before the mission begins nobody may be listening yet: changes wait for its first decision.
-        if self.last.is_some() {
-            self.tell_changes()?;
-        }
-        self.base.node.wait(IDLE)?;
+        self.desk.take(&mut self.logic, &self.base, &mut outgoing)?;
+        self.desk.work(&mut self.logic, SLICE, &mut outgoing);
+        self.hand_over(outgoing);
+        self.tell_aborts()?;
+        self.release()?;
+        self.writer.check()?;
+        let wait = if self.desk.is_busy() { Duration::ZERO } else { IDLE };
+        self.base.node.wait(wait)?;
         Ok(())
     }
 
-    fn offer(&mut self, point: &msg::DecisionPoint) -> Result<()> {
+    fn offer(&mut self, point: &msg::DecisionPoint) -> Result<Option<msg::UpcomingStrips>> {
         // The question again: the answer may have been lost.
         if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task && !point.mission_over) {
-            self.upcoming.publish(last)?;
-            return Ok(());
+            return Ok(Some(last.clone()));
         }
         let now = Tick(point.tick);
-        self.base.set_now(now);
-        let finished = match point.result.first().map(from_msg::task_record).transpose() {
-            Ok(finished) => finished,
-            Err(error) => return self.base.alarm(Severity::Error, "task result refused", &error.to_string()),
-        };
-        let offer = self.logic.on_decision_point(point.task, now, finished.as_ref());
-        let logic = &self.logic;
-        let message = to_msg::upcoming_strips(&self.base.stamper, &offer, |candidate| logic.request(candidate.id));
-        if !point.mission_over {
-            self.upcoming.publish(&message)?;
+        if now < self.logic.now() && self.last.is_none() {
+            let known = self.logic.now();
+            bail!("store {} is of a flight that is at {known}, this one is at {now}", self.reader.path().display());
         }
-        self.last = Some(message);
-        self.tell_changes()?;
-        let counts = self.logic.counts();
-        let count = |standing| counts.get(&standing).copied().unwrap_or(0);
-        self.summary.publish(&to_msg::request_summary(&self.base.stamper, now, count, self.logic.reward()))?;
+        self.base.set_now(now);
+        let results = point.result.iter().chain(&point.last_imaging).map(from_msg::task_record);
+        let results = match results.collect::<Result<Vec<_>, _>>() {
+            Ok(results) => results,
+            Err(error) => {
+                self.base.alarm(Severity::Error, "task result refused", &error.to_string())?;
+                return Ok(None);
+            }
+        };
+        match from_msg::situation(point) {
+            Ok(situation) => self.logic.set_situation(situation),
+            Err(error) => self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?,
+        }
+        let offer = self.logic.on_decision_point(point.task, now, &results);
+        let logic = &self.logic;
+        let named = |id: StripId| logic.request(id).map(|request| &request.named);
+        let message = to_msg::upcoming_strips(&self.base.stamper, &offer, |candidate| named(candidate.id));
+        self.last = Some(message.clone());
+        Ok((!point.mission_over).then_some(message))
+    }
+
+    /// Gives the journal to the writer, and lets what goes out wait for it.
+    fn hand_over(&mut self, outgoing: Vec<Outgoing>) {
+        let entries = Arc::new(self.logic.take_journal());
+        let progress = self.logic.progress();
+        if !entries.is_empty() || progress != self.written {
+            let durability = outgoing.iter().map(Outgoing::durability).max().unwrap_or(Durability::Process);
+            self.writer.write(Arc::clone(&entries), progress, durability);
+            self.written = progress;
+        }
+        let number = self.writer.given();
+        self.outbox.extend(outgoing.into_iter().map(|outgoing| (number, outgoing)));
+        if !entries.is_empty() {
+            self.outbox.push_back((number, Outgoing::News(entries)));
+        }
+    }
+
+    /// Sends what is written.
+    fn release(&mut self) -> Result<()> {
+        let written = self.writer.written();
+        while let Some((_, outgoing)) = self.outbox.pop_front_if(|(number, _)| *number <= written) {
+            match outgoing {
+                Outgoing::Offer(offer) => {
+                    self.upcoming.publish(&offer)?;
+                    for entries in std::mem::take(&mut self.unheard) {
+                        self.tell_news(&entries)?;
+                    }
+                    self.tell_summary()?;
+                }
+                Outgoing::Summary => self.tell_summary()?,
+                // Before the mission begins nobody may be listening yet.
+                Outgoing::News(entries) if self.last.is_none() => self.unheard.push(entries),
+                Outgoing::News(entries) => {
+                    self.tell_news(&entries)?;
+                    self.tell_summary()?;
+                }
+                answer => self.desk.answer(answer, &self.logic, &self.base, &self.reader)?,
+            }
+        }
         Ok(())
     }
 
-    fn tell_changes(&mut self) -> Result<()> {
-        for change in self.logic.take_changes() {
-            self.events.publish(&to_msg::strip_status(&self.base.stamper, &change))?;
+    fn tell_summary(&self) -> Result<()> {
+        Ok(self.summary.publish(&tell::request_summary(&self.base.stamper, &self.logic))?)
+    }
+
+    fn tell_news(&self, entries: &[Entry]) -> Result<()> {
+        for entry in entries {
+            if let Entry::Changed(change) = entry {
+                self.events.publish(&tell::change(&self.base.stamper, &self.logic, change))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn tell_aborts(&mut self) -> Result<()> {
+        for abort in self.logic.take_aborts() {
+            let Abort { task, id } = abort;
+            let state = self.logic.state(id).map_or("unknown", super::lifecycle::State::name);
+            let reason = format!("request {} is {state}", id.0);
+            tracing::info!("task {task} should be given up: {reason}");
+            self.aborts.publish(&tell::task_abort(&self.base.stamper, self.logic.now(), abort, reason))?;
         }
         Ok(())
     }
 }
 
-fn answer(logic: &mut RequestLogic, call: msg::SubmitStripsRequest) -> msg::SubmitStripsResponse {
-    let too_many = call.requests.len() > BATCH_MAX;
-    let submit = |request: &msg::StripRequest| -> Result<StripId, Refusal> {
-        if too_many {
-            return Err(Refusal::Batch { count: call.requests.len(), max: BATCH_MAX });
-        }
-        let named: NamedRequest = from_msg::named_request(request);
-        logic.submit(named)
-    };
-    let results = call.requests.iter().map(submit).map(|result| match result {
-        Ok(id) => msg::SubmitResult { accepted: true, id: id.0, ..msg::SubmitResult::default() },
-        Err(refusal) => {
-            msg::SubmitResult { accepted: false, id: 0, reason_code: refusal.code(), reason: refusal.to_string() }
-        }
-    });
-    msg::SubmitStripsResponse { results: results.collect::<Vec<_>>() }
+/// The requests as they stood, or those of the mission when it begins.
+fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
+    let snapshot = store.snapshot()?;
+    let mut logic =
+        RequestLogic::new((*base.model).clone(), &base.mission.initial(), base.horizon, base.mission.rules());
+    if snapshot.begun {
+        let (count, at) = (snapshot.requests.len(), snapshot.progress.now);
+        logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress)?;
+        tracing::info!("{count} requests are taken up from {}, at {at}", store.path().display());
+        return Ok(logic);
+    }
+    let requests = base.mission.initial_requests()?;
+    let total = requests.len();
+    let accepted = requests.into_iter().filter_map(|request| logic.submit(request).ok()).count();
+    tracing::info!("{accepted} of the {total} strips known from the start are accepted");
+    Ok(logic)
+}
+
+/// Does something with each entry of a call: its results, and why the call as a whole is refused.
+pub(super) fn each<T>(
+    entries: &[T],
+    mut apply: impl FnMut(&T) -> Result<StripId, Refusal>,
+) -> (Vec<msg::SubmitResult>, u16, String) {
+    match super::refusal::check_batch(entries.len()) {
+        Ok(()) => (entries.iter().map(|entry| tell::submit_result(apply(entry))).collect(), 0, String::new()),
+        Err(refusal) => (Vec::new(), refusal.code(), refusal.to_string()),
+    }
 }

@@ -85,3 +85,38 @@ impl Drop for Running {
         }
     }
 }
+
+impl Running {
+    /// Its process number.
+    pub fn id(&self) -> u32 {
+        self.0.id()
+    }
+
+    /// Waits until it ends, and tells whether it succeeded.
+    pub fn wait(&mut self) -> bool {
+        self.0.wait().unwrap().success()
+    }
+}
+
+/// `swath` with some words on a domain.
+pub fn swath(domain: &str, words: &[&str]) -> Command {
+    let mut swath = command("swath", domain);
+    swath.args(words);
+    swath
+}
+
+/// The JSON values that a command prints, one a line.
+pub fn json_lines(text: &str) -> Vec<serde_json::Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Looks again and again until something is found; tests give up after a minute.
+pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    for _ in 0..600 {
+        if let Some(found) = look() {
+            return found;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    panic!("{what} did not come within a minute");
+}

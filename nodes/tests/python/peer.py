@@ -76,13 +76,21 @@ class StripStatus(IdlStruct, typename="swath_msgs::msg::dds_::StripStatus_"):
     header: Header
     strip: Strip
     client_ref: str
+    submitter: str
     state: uint8
     reason_code: uint16
     reason: str
+    actor: str
     tick: uint64
+    created_tick: uint64
     attempts: uint32
     reward: float64
+    window_open: Time
+    window_close: Time
+    imaging: Time
     linked_to: uint64
+    supersedes: uint64
+    superseded_by: uint64
 
 
 @dataclass
@@ -127,6 +135,64 @@ class SubmitResponse(IdlStruct, typename="swath_msgs::srv::dds_::SubmitStrips_Re
     client: uint64
     number: int64
     results: sequence[SubmitResult]
+    reason_code: uint16
+    reason: str
+
+
+@dataclass
+@ann.final
+class CancelRequest(IdlStruct, typename="swath_msgs::srv::dds_::CancelStrips_Request_"):
+    client: uint64
+    number: int64
+    ids: sequence[uint64]
+    actor: str
+    reason: str
+
+
+@dataclass
+@ann.final
+class CancelResponse(IdlStruct, typename="swath_msgs::srv::dds_::CancelStrips_Response_"):
+    client: uint64
+    number: int64
+    results: sequence[SubmitResult]
+    reason_code: uint16
+    reason: str
+
+
+@dataclass
+@ann.final
+class Opportunity(IdlStruct, typename="swath_msgs::msg::dds_::Opportunity_"):
+    window_open_tick: uint64
+    window_close_tick: uint64
+    window_open: Time
+    window_close: Time
+    t_acq_ticks: uint32
+    min_elevation: float64
+    transition_found: bool
+    transition_ticks: uint32
+    conflicts: uint32
+    conflict_ids: sequence[uint64, 16]
+
+
+@dataclass
+@ann.final
+class PreviewRequest(IdlStruct, typename="swath_msgs::srv::dds_::PreviewStrip_Request_"):
+    client: uint64
+    number: int64
+    id: uint64
+    request: StripRequest
+    horizon_s: float64
+
+
+@dataclass
+@ann.final
+class PreviewResponse(IdlStruct, typename="swath_msgs::srv::dds_::PreviewStrip_Response_"):
+    client: uint64
+    number: int64
+    opportunities: sequence[Opportunity]
+    now: Time
+    reason_code: uint16
+    reason: str
 
 
 class Peer:
@@ -143,8 +209,15 @@ class Peer:
         self.states = reader("rt/swath/spacecraft/state", SpacecraftState)
         self.events = reader("rt/swath/requests/events", StripStatus)
         self.plain = writer("rt/swath/requests/request", StripRequest)
-        self.requests = writer("rq/swath/requests/submitRequest", SubmitRequest)
-        self.responses = reader("rr/swath/requests/submitReply", SubmitResponse)
+        self.services = {
+            name: (writer(f"rq/swath/requests/{name}Request", request), reader(f"rr/swath/requests/{name}Reply", response))
+            for name, request, response in [
+                ("submit", SubmitRequest, SubmitResponse),
+                ("cancel", CancelRequest, CancelResponse),
+                ("preview", PreviewRequest, PreviewResponse),
+            ]
+        }
+        self.number = 0
 
     def wait(self, what, look):
         deadline = time.monotonic() + TIMEOUT_S
@@ -155,17 +228,29 @@ class Peer:
             time.sleep(0.01)
         sys.exit(f"{what} did not come within {TIMEOUT_S} s")
 
-    def submit(self, strips):
-        """Calls the service; asks again, because a request can be lost before both ends are matched."""
-        for number in range(1, 20):
-            self.requests.write(SubmitRequest(77, number, strips))
+    def call(self, name, make):
+        """Calls a service; asks again, because a request can be lost before both ends are matched."""
+        requests, responses = self.services[name]
+        for _ in range(20):
+            self.number += 1
+            requests.write(make(77, self.number))
             deadline = time.monotonic() + 1.0
             while time.monotonic() < deadline:
-                for response in self.responses.take(10):
+                for response in responses.take(10):
                     if response.client == 77:
-                        return response.results
+                        return response
                 time.sleep(0.01)
-        sys.exit("nobody answers requests/submit")
+        sys.exit(f"nobody answers requests/{name}")
+
+    def submit(self, strips):
+        return self.call("submit", lambda client, number: SubmitRequest(client, number, strips)).results
+
+    def cancel(self, ids):
+        make = lambda client, number: CancelRequest(client, number, ids, "peer", "changed my mind")
+        return self.call("cancel", make).results
+
+    def preview(self, strip, horizon_s):
+        return self.call("preview", lambda client, number: PreviewRequest(client, number, 0, strip, horizon_s))
 
 
 def request(reference, latitude, longitude):
@@ -182,6 +267,11 @@ def main():
     results = peer.submit([request(f"peer-{i}", *place) for i, place in enumerate(grid)])
     refused = peer.submit([request("peer-nan", float("nan"), 0.0), request("peer-north", 90.5, 0.0)])
     peer.plain.write(request("peer-plain", 5.0, 10.0))
+    preview = peer.preview(request("peer-preview", 5.0, 60.0), 0.0)
+    no_preview = peer.preview(request("peer-preview", 85.0, 60.0), 0.0)
+    # The strip that comes last has the most time to be taken back.
+    last = peer.submit([request("peer-cancel", 7.0, 33.0)])[0].id
+    cancelled = peer.cancel([last, 123456])
     ids = {result.id for result in results if result.accepted}
     seen = set()
 
@@ -199,6 +289,10 @@ def main():
         "radius_m": (state.r_bn_n.x**2 + state.r_bn_n.y**2 + state.r_bn_n.z**2) ** 0.5,
         "accepted": len(ids),
         "refused": [result.reason_code for result in refused],
+        "opportunities": len(preview.opportunities),
+        "elevations": [opportunity.min_elevation for opportunity in preview.opportunities],
+        "no_opportunity": no_preview.reason_code,
+        "cancelled": [(result.accepted, result.reason_code) for result in cancelled],
         "imaged": event.client_ref,
         "imaged_reward": event.reward,
     }))

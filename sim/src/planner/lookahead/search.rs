@@ -95,7 +95,7 @@ impl<'a> Search<'a> {
 
     /// Ticks after which the attitude error stays within its limit, in a flight with this transition; `None` when it is
     /// not settled `latest` ticks from now.
-    fn settling(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32, latest: u32) -> Option<u32> {
+    pub fn settling(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32, latest: u32) -> Option<u32> {
         self.begin(from, candidate, t_pre);
         let limit = self.sigma_max * self.sigma_max;
         let well_within = limit * SETTLED_SHARE * SETTLED_SHARE;

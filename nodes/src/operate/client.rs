@@ -1,0 +1,65 @@
+//! Calls to the nodes of a flying mission.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use swath_msgs::RosService;
+use swath_ros::{Node, RosArgs, graph};
+
+/// How long to wait for a node to be there, and for each answer.
+const TIMEOUT: Duration = Duration::from_secs(10);
+
+/// An operator's node.
+pub struct Operator {
+    /// The ROS node.
+    pub node: Node,
+}
+
+/// A service that answers.
+pub struct Desk<S> {
+    client: swath_ros::Client<S>,
+}
+
+impl Operator {
+    /// Comes up under a name of its own.
+    ///
+    /// # Errors
+    /// When DDS cannot be used.
+    pub fn start() -> Result<Self> {
+        Ok(Self { node: Node::start(&format!("operator_{}", std::process::id()), &RosArgs::default())? })
+    }
+
+    /// Finds a service.
+    ///
+    /// # Errors
+    /// When nobody serves it.
+    pub fn desk<S: RosService>(&self, service: &graph::Service<S>) -> Result<Desk<S>> {
+        let client = self.node.client(service)?;
+        let node = service.entry.writers.first().unwrap_or(&"node");
+        self.node
+            .wait_for_service(&client, TIMEOUT)
+            .with_context(|| format!("no {} is flying in this domain", node.replace('_', " ")))?;
+        Ok(Desk { client })
+    }
+}
+
+impl<S: RosService> Desk<S> {
+    /// Calls it.
+    ///
+    /// # Errors
+    /// When no answer comes in time.
+    pub fn call(&self, request: S::Request) -> Result<S::Response> {
+        Ok(self.client.call(request, TIMEOUT)?)
+    }
+}
+
+/// Fails with the reason of a call that was refused as a whole.
+///
+/// # Errors
+/// When there is a reason.
+pub fn check(reason_code: u16, reason: &str) -> Result<()> {
+    if reason_code != 0 {
+        bail!("{reason} (reason {reason_code})");
+    }
+    Ok(())
+}

@@ -1,0 +1,165 @@
+//! `swath planner`: what the planner may do by itself.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand, ValueEnum};
+use serde_json::json;
+use swath_msgs::swath_msgs as msg;
+use swath_ros::graph;
+
+use super::client::Operator;
+
+/// `swath planner`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  swath planner mode approve\n  swath planner status\n  swath planner approve")]
+pub struct PlannerArgs {
+    #[command(subcommand)]
+    command: PlannerCommand,
+    /// Who acts.
+    #[arg(long, global = true, default_value = "operator")]
+    actor: String,
+    /// Print JSON.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum PlannerCommand {
+    /// Let it fly what it chooses, propose it, or choose nothing.
+    Mode {
+        /// The mode.
+        mode: ModeName,
+    },
+    /// Approve what it proposes.
+    Approve {
+        /// Number of the proposal; the open one without it.
+        #[arg(default_value_t = 0)]
+        proposal: u64,
+    },
+    /// Reject what it proposes: the strip is not proposed again in this window.
+    Reject {
+        /// Number of the proposal; the open one without it.
+        #[arg(default_value_t = 0)]
+        proposal: u64,
+    },
+    /// Show the mode and the proposal.
+    Status,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ModeName {
+    /// It chooses and the satellite flies.
+    Autonomous,
+    /// It proposes and an operator approves.
+    Approve,
+    /// It chooses nothing: the attitude is held.
+    Hold,
+}
+
+/// How long to wait for the planner's latched status.
+const TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Runs `swath planner`.
+///
+/// # Errors
+/// When the planner does not answer or refuses.
+#[expect(clippy::print_stdout, reason = "the answer is this command's result")]
+pub fn run(args: &PlannerArgs) -> Result<()> {
+    let operator = Operator::start()?;
+    match &args.command {
+        PlannerCommand::Mode { mode } => {
+            let number = match mode {
+                ModeName::Autonomous => msg::PlannerStatus::MODE_AUTONOMOUS,
+                ModeName::Approve => msg::PlannerStatus::MODE_APPROVE,
+                ModeName::Hold => msg::PlannerStatus::MODE_HOLD,
+            };
+            let call = msg::SetPlannerModeRequest { mode: number, actor: args.actor.clone() };
+            let answer = operator.desk(&graph::SET_PLANNER_MODE)?.call(call)?;
+            if !answer.accepted {
+                bail!("{}", answer.reason);
+            }
+            let name = mode_name(number);
+            println!("{}", if args.json { json!({ "mode": name }).to_string() } else { format!("mode {name}") });
+        }
+        PlannerCommand::Approve { proposal } => review(&operator, args, *proposal, true)?,
+        PlannerCommand::Reject { proposal } => review(&operator, args, *proposal, false)?,
+        PlannerCommand::Status => {
+            let statuses = operator.node.subscription(&graph::PLANNER_STATUS)?;
+            let status = statuses.wait(operator.node.signal(), TIMEOUT)?;
+            let status = status.context("no planner is flying in this domain")?;
+            if args.json {
+                println!("{}", status_json(&status));
+            } else {
+                print!("{}", status_text(&status));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[expect(clippy::print_stdout, reason = "the answer is this command's result")]
+fn review(operator: &Operator, args: &PlannerArgs, proposal: u64, approve: bool) -> Result<()> {
+    let call = msg::ReviewProposalRequest { proposal, approve, actor: args.actor.clone() };
+    let answer = operator.desk(&graph::REVIEW_PROPOSAL)?.call(call)?;
+    if !answer.accepted {
+        bail!("{}", answer.reason);
+    }
+    let verb = if approve { "approved" } else { "rejected" };
+    if args.json {
+        println!("{}", json!({ "proposal": answer.proposal, "approved": approve }));
+    } else {
+        println!("{verb} proposal {}", answer.proposal);
+    }
+    Ok(())
+}
+
+fn mode_name(mode: u8) -> &'static str {
+    match mode {
+        msg::PlannerStatus::MODE_APPROVE => "approve",
+        msg::PlannerStatus::MODE_HOLD => "hold",
+        _ => "autonomous",
+    }
+}
+
+fn status_json(status: &msg::PlannerStatus) -> serde_json::Value {
+    let state = match status.proposal_state {
+        msg::PlannerStatus::PROPOSAL_OPEN => "open",
+        msg::PlannerStatus::PROPOSAL_APPROVED => "approved",
+        _ => "none",
+    };
+    json!({
+        "mode": mode_name(status.mode),
+        "planner": status.planner,
+        "proposal_state": state,
+        "proposal": status.proposal,
+        "strip": status.strip.id,
+        "name": status.strip.name,
+        "t_pre_ticks": status.t_pre_ticks,
+        "window_close_tick": status.window_close_tick,
+        "deadline_tick": status.deadline_tick,
+        "last_outcome": status.last_outcome,
+    })
+}
+
+/// The status as lines for people.
+pub fn status_text(status: &msg::PlannerStatus) -> String {
+    let mut text = format!("planner {}, mode {}\n", status.planner, mode_name(status.mode));
+    if status.proposal != 0 {
+        let decided = if status.proposal_state == msg::PlannerStatus::PROPOSAL_APPROVED {
+            "approved, waits for its window".to_owned()
+        } else if status.deadline_tick == 0 {
+            "waits for an operator".to_owned()
+        } else {
+            format!("waits for an operator until tick {}", status.deadline_tick)
+        };
+        text += &format!(
+            "proposal {}: strip {} {} after {} ticks of transition; {decided}\n",
+            status.proposal, status.strip.id, status.strip.name, status.t_pre_ticks
+        );
+    }
+    if !status.last_outcome.is_empty() {
+        text += &format!("before: {}\n", status.last_outcome);
+    }
+    text
+}

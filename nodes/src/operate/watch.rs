@@ -1,0 +1,126 @@
+//! `swath strips watch`: requests as they change.
+
+use std::collections::VecDeque;
+use std::io::{IsTerminal as _, Write as _};
+use std::time::Duration;
+
+use anyhow::Result;
+use clap::Args;
+use swath_msgs::swath_msgs as msg;
+use swath_ros::{Shutdown, graph};
+
+use super::client::Operator;
+use super::show::{state_name, status_head, status_json, status_line, time};
+
+/// `swath strips watch`.
+#[derive(Debug, Args)]
+pub struct WatchArgs {
+    /// Print each change as a JSON line.
+    #[arg(long)]
+    json: bool,
+    /// End after this many changes.
+    #[arg(long)]
+    count: Option<u64>,
+}
+
+const REFRESH: Duration = Duration::from_millis(250);
+/// Changes that the live view shows.
+const SHOWN: usize = 20;
+
+/// Watches requests change until Ctrl-C.
+///
+/// # Errors
+/// When DDS cannot be used.
+pub fn watch(args: &WatchArgs) -> Result<()> {
+    let operator = Operator::start()?;
+    let shutdown = Shutdown::on_signals(operator.node.signal())?;
+    let events = operator.node.subscription(&graph::STRIP_EVENTS)?;
+    let summaries = operator.node.subscription(&graph::REQUEST_SUMMARY)?;
+    let planner = operator.node.subscription(&graph::PLANNER_STATUS)?;
+    let live = std::io::stdout().is_terminal() && !args.json;
+    let mut view = View::default();
+    let mut seen = 0;
+    while !shutdown.asked() {
+        let mut news = false;
+        while let Some(event) = events.take()? {
+            seen += 1;
+            news = true;
+            if !live {
+                print_event(&event, args.json)?;
+            }
+            view.last.push_front(event);
+            view.last.truncate(SHOWN);
+            if args.count.is_some_and(|count| seen >= count) {
+                return Ok(());
+            }
+        }
+        while let Some(summary) = summaries.take()? {
+            view.summary = Some(summary);
+            news = true;
+        }
+        while let Some(status) = planner.take()? {
+            view.planner = Some(status);
+            news = true;
+        }
+        if live && news {
+            let mut stdout = std::io::stdout().lock();
+            write!(stdout, "\x1b[H\x1b[2J{}", view.text())?;
+            stdout.flush()?;
+            // A person reads a few pictures a second.
+            std::thread::sleep(REFRESH);
+        } else {
+            operator.node.wait(REFRESH)?;
+        }
+    }
+    Ok(())
+}
+
+fn print_event(event: &msg::StripStatus, json: bool) -> Result<()> {
+    let line = if json { status_json(event).to_string() } else { event_line(event) };
+    let mut stdout = std::io::stdout().lock();
+    writeln!(stdout, "{line}")?;
+    Ok(stdout.flush()?)
+}
+
+fn event_line(event: &msg::StripStatus) -> String {
+    format!("{}  {}", time(&event.header.stamp), status_line(event))
+}
+
+#[derive(Default)]
+struct View {
+    summary: Option<msg::RequestSummary>,
+    planner: Option<msg::PlannerStatus>,
+    last: VecDeque<msg::StripStatus>,
+}
+
+impl View {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        if let Some(it) = &self.summary {
+            text += &format!(
+                "{}  {} accepted, {} held, {} under way, {} imaged, {} failed, {} expired, {} refused, reward {:.2}\n",
+                time(&it.header.stamp),
+                it.accepted,
+                it.held,
+                it.scheduled + it.executing,
+                it.completed,
+                it.failed,
+                it.expired,
+                it.rejected,
+                it.reward,
+            );
+        }
+        if let Some(it) = &self.planner {
+            text += &super::planner::status_text(it);
+        }
+        text += &format!("\n{:<22}{}\n", "changed", status_head());
+        for event in &self.last {
+            let mark = if event.state == msg::StripStatus::STATE_COMPLETED { "\x1b[32m" } else { "" };
+            text += &format!("{mark}{}\x1b[0m\n", event_line(event));
+        }
+        if self.last.is_empty() {
+            text += &format!("nothing is {} yet\n", state_name(msg::StripStatus::STATE_SCHEDULED));
+        }
+        text
+    }
+}
