@@ -154,12 +154,13 @@ mod tests {
     fn it_decides_once_when_both_halves_are_there_in_either_order() {
         let env = env();
         let situation = *env.context().situation;
-        let make =
-            || PlannerLogic::new(
+        let make = || {
+            PlannerLogic::new(
                 (**env.model()).clone(),
                 GuardedPlanner::new(Box::new(Heuristic { t_pre_s: 90.0 })),
                 gate(env.model()),
-            );
+            )
+        };
         let mut first = make();
         assert_eq!(first.on_decision_point(0, situation), None);
         let planned = first.on_upcoming(upcoming(&env, 0)).unwrap();

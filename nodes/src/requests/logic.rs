@@ -118,6 +118,8 @@ pub struct RequestLogic {
     pub(super) rejected: usize,
     pub(super) reward: f64,
     pub(super) progress: Progress,
+    /// Number of the last task that was wanted.
+    wanted: u64,
     pub(super) journal: Vec<Entry>,
     pub(super) aborts: Vec<Abort>,
 }
@@ -141,6 +143,7 @@ impl RequestLogic {
             rejected: 0,
             reward: 0.0,
             progress: Progress::default(),
+            wanted: 0,
             journal: Vec::new(),
             aborts: Vec::new(),
         }
@@ -274,6 +277,7 @@ impl RequestLogic {
     /// the candidates.
     pub fn on_decision_point(&mut self, task: u64, now: Tick, results: &[TaskRecord]) -> Offer {
         self.progress.now = self.progress.now.max(now);
+        self.wanted = self.wanted.max(task);
         for record in results {
             if record.strip.is_some() && record.task >= self.progress.settled {
                 self.progress.settled = record.task + 1;
@@ -305,10 +309,11 @@ impl RequestLogic {
         self.situation = Some(situation);
     }
 
-    /// A strip was chosen as the next task. A choice that came too late for a change of the request is given up.
+    /// A strip was chosen as the next task. A choice that came too late for a change of the request is given up; one
+    /// for a task that is no longer wanted is nothing.
     pub fn on_task(&mut self, flown: InFlight) {
         let known = self.progress.in_flight.is_some_and(|under_way| under_way.task >= flown.task);
-        if flown.task < self.progress.settled || known {
+        if flown.task < self.progress.settled || flown.task < self.wanted || known {
             return;
         }
         let Ok(request) = self.known(flown.id) else { return };

@@ -137,7 +137,10 @@ fn a_result_is_settled_although_its_beginning_was_not_heard_of() {
     logic.on_decision_point(3, Tick(900), &[]);
     assert_eq!(logic.request(id).unwrap().reason.0, 204, "task 1 was not flown");
     logic.on_task(chosen(1, id));
+    assert_eq!(logic.state(id), Some(State::Accepted), "task 1 is no longer wanted");
+    logic.on_task(chosen(3, id));
     assert_eq!(logic.state(id), Some(State::Scheduled));
+    assert!(logic.take_aborts().is_empty());
 }
 
 #[test]

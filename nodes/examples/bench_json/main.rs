@@ -1,6 +1,8 @@
-//! Measures a mission over DDS in lockstep and prints one JSON object; `cargo xtask bench` merges it with those of the
+//! Measures missions over DDS in lockstep and the request manager at scale, and prints one JSON object; `cargo xtask bench` merges it with those of the
 //! other crates.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
+
+mod requests;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -25,13 +27,10 @@ fn main() -> Result<()> {
         factors.push(summary.real_time_factor);
         memory.push(kilobytes as f64 / 1e3);
     }
-    println!(
-        "{}",
-        serde_json::json!({
-            "lockstep_real_time_factor": median(factors),
-            "suite_memory_MB": median(memory),
-        })
-    );
+    let mut figures = requests::measure(&swath)?;
+    figures["lockstep_real_time_factor"] = median(factors).into();
+    figures["suite_memory_MB"] = median(memory).into();
+    println!("{figures}");
     Ok(())
 }
 
