@@ -330,8 +330,11 @@ fn properties_of(feature: &Feature, fallback: &str) -> Result<NamedRequest, Stri
     })
 }
 
-/// Ends of the strips that a line becomes: longitude and latitude [deg].
-fn cut_line(line: &[Position], lengths: Lengths) -> Result<Vec<([f64; 2], [f64; 2])>, String> {
+/// Start and end of a strip: longitude and latitude [deg].
+type Ends = ([f64; 2], [f64; 2]);
+
+/// The strips that a line becomes.
+fn cut_line(line: &[Position], lengths: Lengths) -> Result<Vec<Ends>, String> {
     let points: Vec<[f64; 2]> =
         line.iter().filter(|point| point.len() >= 2).map(|point| [point[0], point[1]]).collect();
     let [first, .., last] = points[..] else {

@@ -80,6 +80,12 @@ impl Mapping {
         }
     }
 
+    /// The identity that goes beside a response, in its sample's header. With [`Mapping::Cyclone`] it is in the message;
+    /// beside it, RustDDS would fill datagrams beyond what UDP takes, and no response over 64 kB would arrive.
+    fn beside(self, id: RequestId) -> Option<SampleIdentity> {
+        (self == Self::Enhanced).then(|| id.identity())
+    }
+
     /// Takes a request or response apart. `client` is whose first half of the identity counts.
     fn unwrap<M: RosMessage>(self, sample: &RawSample, client: [u8; 16]) -> Result<(RequestId, M), RosError> {
         match self {
@@ -133,7 +139,7 @@ impl<S: RosService> Server<S> {
     /// Answers a request.
     pub fn respond(&self, id: RequestId, response: S::Response) -> Result<(), RosError> {
         let cdr = self.mapping.wrap(id, response)?;
-        self.responses.send(cdr, Some(id.identity())).map(|_| ())
+        self.responses.send(cdr, self.mapping.beside(id)).map(|_| ())
     }
 
     /// Answers all requests that have come, and returns how many.
@@ -188,10 +194,7 @@ impl<S: RosService> Client<S> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
         let id = RequestId { client: self.requests.gid().0, number };
         let cdr = self.mapping.wrap(id, request)?;
-        let sent = match self.mapping {
-            Mapping::Cyclone => self.requests.send(cdr, Some(id.identity()))?,
-            Mapping::Enhanced => self.requests.send(cdr, None)?,
-        };
+        let sent = self.requests.send(cdr, None)?;
         Ok(match self.mapping {
             Mapping::Cyclone => id,
             Mapping::Enhanced => RequestId::of(sent),

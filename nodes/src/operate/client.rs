@@ -1,13 +1,15 @@
 //! Calls to the nodes of a flying mission.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use swath_msgs::RosService;
-use swath_ros::{Node, RosArgs, graph};
+use swath_ros::{Node, RosArgs, RosError, graph};
 
-/// How long to wait for a node to be there, and for each answer.
+/// How long to wait for a node to be there, and for an answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
+/// How long an answer may take before the call is made again: the first one after a match may be lost.
+const ONE_TRY: Duration = Duration::from_secs(2);
 
 /// An operator's node.
 pub struct Operator {
@@ -44,11 +46,26 @@ impl Operator {
 }
 
 impl<S: RosService> Desk<S> {
-    /// Calls it.
+    /// Calls it, again and again until there is an answer: only for calls that do no harm when they come twice.
     ///
     /// # Errors
     /// When no answer comes in time.
     pub fn call(&self, request: S::Request) -> Result<S::Response> {
+        let deadline = Instant::now() + TIMEOUT;
+        loop {
+            match self.client.call(request.clone(), ONE_TRY) {
+                Err(RosError::NoAnswer { .. }) if Instant::now() < deadline => {}
+                answer => return Ok(answer?),
+            }
+        }
+    }
+
+    /// Calls it once, after `harmless` has been answered.
+    ///
+    /// # Errors
+    /// When no answer comes in time.
+    pub fn call_once(&self, harmless: S::Request, request: S::Request) -> Result<S::Response> {
+        self.call(harmless)?;
         Ok(self.client.call(request, TIMEOUT)?)
     }
 }

@@ -100,8 +100,10 @@ pub fn run(args: &PlannerArgs) -> Result<()> {
 
 #[expect(clippy::print_stdout, reason = "the answer is this command's result")]
 fn review(operator: &Operator, args: &PlannerArgs, proposal: u64, approve: bool) -> Result<()> {
+    // No proposal has that number.
+    let nothing = msg::ReviewProposalRequest { proposal: u64::MAX, ..Default::default() };
     let call = msg::ReviewProposalRequest { proposal, approve, actor: args.actor.clone() };
-    let answer = operator.desk(&graph::REVIEW_PROPOSAL)?.call(call)?;
+    let answer = operator.desk(&graph::REVIEW_PROPOSAL)?.call_once(nothing, call)?;
     if !answer.accepted {
         bail!("{}", answer.reason);
     }

@@ -163,7 +163,7 @@ pub fn list(args: &ListArgs) -> Result<()> {
         opportunity_from: at(args.from),
         opportunity_until: at(args.until),
         after_id: args.after,
-        limit: if args.limit == 0 { 1000 } else { args.limit },
+        limit: if args.limit == 0 { 100 } else { args.limit },
     };
     if !args.json {
         println!("{}", status_head());

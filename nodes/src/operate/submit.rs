@@ -134,7 +134,7 @@ pub fn cancel(args: &DecideArgs) -> Result<()> {
     let operator = Operator::start()?;
     let Actor { actor, reason } = &args.actor;
     let call = msg::CancelStripsRequest { ids: args.ids.clone(), actor: actor.clone(), reason: reason.clone() };
-    let answer = operator.desk(&graph::CANCEL_STRIPS)?.call(call)?;
+    let answer = operator.desk(&graph::CANCEL_STRIPS)?.call_once(Default::default(), call)?;
     check(answer.reason_code, &answer.reason)?;
     tell(args, "cancelled", &answer.results)
 }
@@ -147,7 +147,7 @@ pub fn review(args: &DecideArgs, action: u8) -> Result<()> {
     let operator = Operator::start()?;
     let Actor { actor, reason } = &args.actor;
     let call = msg::ReviewStripsRequest { ids: args.ids.clone(), action, actor: actor.clone(), reason: reason.clone() };
-    let answer = operator.desk(&graph::REVIEW_STRIPS)?.call(call)?;
+    let answer = operator.desk(&graph::REVIEW_STRIPS)?.call_once(Default::default(), call)?;
     check(answer.reason_code, &answer.reason)?;
     let done = match action {
         msg::ReviewStripsRequest::ACTION_HOLD => "held",

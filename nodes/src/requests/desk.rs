@@ -203,7 +203,7 @@ fn preview(logic: &RequestLogic, base: &MissionNode, call: &msg::PreviewStripReq
 
 /// Tick up to which a preview looks.
 fn horizon(logic: &RequestLogic, base: &MissionNode, horizon_s: f64) -> Result<Tick, Refusal> {
-    if !(horizon_s >= 0.0) {
+    if horizon_s.is_nan() || horizon_s < 0.0 {
         return Err(Refusal::Call { field: "horizon_s", value: horizon_s, limits: "0 and above" });
     }
     if horizon_s == 0.0 {

@@ -217,7 +217,7 @@ pub(super) fn place(request: &StripRequest) -> Place {
 }
 
 /// Whether two orders ask for the same; of a bidirectional one the other direction may have been kept.
-fn same_order(known: &NamedRequest, given: &NamedRequest) -> bool {
+pub(super) fn same_order(known: &NamedRequest, given: &NamedRequest) -> bool {
     known == given
         || (given.request.bidirectional
             && *known == NamedRequest { request: given.request.reversed(), ..given.clone() })

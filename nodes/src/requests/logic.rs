@@ -14,7 +14,7 @@ use swath_sim::time::Tick;
 use swath_sim::windows::Window;
 
 use super::index::Index;
-use super::intake::{Place, place};
+use super::intake::{Place, place, same_order};
 use super::journal::{Change, Entry, InFlight, Progress, Standing};
 use super::lifecycle::State;
 use super::refusal::{Refusal, check_text};
@@ -205,11 +205,17 @@ impl RequestLogic {
         result
     }
 
-    /// Takes a request in place of another one.
+    /// Takes a request in place of another one. The same call again gets the number that the request has.
     ///
     /// # Errors
     /// Why it is refused; the other one stays as it is then.
     pub fn replace(&mut self, old: StripId, named: NamedRequest) -> Result<StripId, Refusal> {
+        if let Some(new) = self.request(old).and_then(|request| request.standing.superseded_by)
+            && self.by_reference(&named.submitter, &named.client_ref) == Some(new)
+            && self.request(new).is_some_and(|request| same_order(&request.named, &named))
+        {
+            return Ok(new);
+        }
         let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old)));
         let new = match result {
             Ok(new) => new,

@@ -81,6 +81,7 @@ struct Simple {
     state: State,
     counted: u32,
     imaged: u32,
+    replaced_by: Option<usize>,
 }
 
 /// The model: a list, looked through from end to end.
@@ -113,8 +114,15 @@ impl Simpler {
             return None;
         }
         let state = if hold { State::Held } else { State::Accepted };
-        self.requests.push(Simple { reference, place, hold, state, counted: 0, imaged: 0 });
+        self.requests.push(Simple { reference, place, hold, state, counted: 0, imaged: 0, replaced_by: None });
         Some(self.requests.len() - 1)
+    }
+
+    /// What replaced a request, when it is the newest of this reference and asks for the same.
+    fn replaced_by(&self, old: usize, reference: u8, place: u8) -> Option<usize> {
+        let new = self.requests.get(old)?.replaced_by.filter(|&new| self.newest(reference) == Some(new))?;
+        let it = &self.requests[new];
+        ((it.place, it.hold) == (place, false)).then_some(new)
     }
 
     fn may_leave(&self, i: usize) -> bool {
@@ -181,7 +189,10 @@ impl Trial {
             }
             Operation::Replace { id: i, reference, place } => {
                 let old = usize::from(i);
-                let expected = if self.simple.may_leave(old) {
+                let again = self.simple.replaced_by(old, reference, place);
+                let expected = if again.is_some() {
+                    again
+                } else if self.simple.may_leave(old) {
                     // Under a reference of its own a request is known, and stands in for the old one.
                     self.simple.submit(reference, place, false, Some(old))
                 } else {
@@ -189,8 +200,9 @@ impl Trial {
                 };
                 let given = self.logic.replace(id(i), named(reference, place, false));
                 assert_eq!(given.ok().map(|id| id.0 as usize - 1), expected);
-                if expected.is_some() {
+                if let Some(new) = expected.filter(|_| again.is_none()) {
                     self.simple.requests[old].state = State::Superseded;
+                    self.simple.requests[old].replaced_by = Some(new);
                 }
             }
             Operation::Review(i, action) => self.review(i, action),

@@ -60,7 +60,7 @@ fn busy(store: &mut Store) -> RequestLogic {
         let reward = if failure.is_none() { 0.4 } else { 0.0 };
         let (strip, outcome) = (Some(id), outcome(failure));
         let record = TaskRecord { task, start, end: start.after(300), strip, t_pre: 100, t_acq: 200, outcome, reward };
-        logic.on_decision_point(task + 1, record.end, &[record.clone()]);
+        logic.on_decision_point(task + 1, record.end, std::slice::from_ref(&record));
     }
     logic.on_task(InFlight { task: 2, id: accepted[11], start: Tick(600), t_pre: 100, t_acq: 200 });
     write(store, &mut logic);

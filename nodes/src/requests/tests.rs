@@ -200,6 +200,7 @@ fn a_replacement_takes_over_and_a_refused_one_changes_nothing() {
     assert_eq!(logic.request(old).unwrap().standing.superseded_by, Some(new));
     assert_eq!(logic.request(new).unwrap().supersedes, Some(old));
     assert_eq!((logic.state(old), logic.state(new)), (Some(State::Superseded), Some(State::Accepted)));
+    assert_eq!(logic.replace(old, better.clone()), Ok(new), "the same call again");
     assert_eq!(logic.submit(better), Ok(new), "the reference is the new one's");
     assert_eq!(logic.replace(old, equatorial("z", 80.0)).unwrap_err().code(), 121);
     assert_eq!(logic.replace(StripId(99), equatorial("z", 80.0)).unwrap_err().code(), 120);
