@@ -138,7 +138,7 @@ fn judge(request: SubmitStripsRequest) -> SubmitStripsResponse {
         reason: strip.name.clone(),
         ..Default::default()
     };
-    SubmitStripsResponse { results: request.requests.iter().map(judge_one).collect() }
+    SubmitStripsResponse { results: request.requests.iter().map(judge_one).collect(), ..Default::default() }
 }
 
 fn services_answer(trial: &Trial, mapping: Mapping) {
