@@ -1,6 +1,7 @@
 //! A mission: what is flown, for how long, for whom and by which planner.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
@@ -17,6 +18,10 @@ use crate::approval::ApprovalConfig;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
 use crate::requests_file::{self, Lengths, NamedRequest, RequestsFileError};
+
+/// In a paced mission, the wall-clock time that planning a task may take where ticks are shorter than that; the time lost
+/// is made up.
+pub(crate) const PACED_PATIENCE: Duration = Duration::from_millis(100);
 
 /// Why a mission cannot be flown.
 #[derive(Debug, Error)]

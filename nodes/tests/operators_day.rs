@@ -110,12 +110,18 @@ fn an_operators_day() {
             day.json("planner status").into_iter().find(|status| status["proposal_state"] == "open")
         })
     };
-    let proposal = proposed(&day);
-    note("planner approve");
-    day.swath("planner approve");
-    let strip = proposal["strip"].as_u64().unwrap();
-    common::until("the approved attempt", || {
-        day.show(strip)["history"].as_array()?.iter().any(|it| it["state"] == "scheduled").then_some(())
+    note("planner approve 3");
+    // A proposal is withdrawn when its window closes before the operator has looked at it.
+    let mut approved = std::collections::BTreeSet::new();
+    common::until("an approved attempt", || {
+        let proposal = proposed(&day);
+        let number = &proposal["proposal"];
+        if common::run(&mut day.command(&format!("planner approve {number}"))).status.success() {
+            approved.insert(proposal["strip"].as_u64().unwrap());
+        }
+        let scheduled =
+            |strip: u64| day.show(strip)["history"].as_array().unwrap().iter().any(|it| it["state"] == "scheduled");
+        approved.iter().any(|&strip| scheduled(strip)).then_some(())
     });
     note("planner reject");
     proposed(&day);

@@ -8,6 +8,7 @@ use swath_ros::Spec;
 use swath_ros::{Publisher, Subscription, graph};
 
 use super::logic::{Command, Effect, GuidanceLogic};
+use crate::mission::PACED_PATIENCE;
 use crate::node::{MissionNode, Severity};
 use crate::{from_msg, to_msg};
 
@@ -61,7 +62,11 @@ impl GuidanceNode {
         let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
         base.node.parameters().check_given()?;
         let period = base.model.period;
-        let seconds = if pace > 0.0 { PACED_SHARE * period.seconds() / pace } else { mission.planning_deadline_s };
+        let seconds = if pace > 0.0 {
+            (PACED_SHARE * period.seconds() / pace).max(PACED_PATIENCE.as_secs_f64())
+        } else {
+            mission.planning_deadline_s
+        };
         let hold = period.ticks_ceil(mission.hold_s);
         Ok(Self {
             logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold),

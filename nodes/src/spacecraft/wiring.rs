@@ -12,6 +12,7 @@ use swath_sim::time::Tick;
 
 use super::logic::{SpacecraftLogic, StateSample};
 use super::telemetry::Telemetry;
+use crate::mission::PACED_PATIENCE;
 use crate::node::{MissionNode, Severity};
 use crate::to_msg;
 
@@ -19,6 +20,8 @@ use crate::to_msg;
 const RESEND_AFTER: Duration = Duration::from_millis(300);
 /// How long the last messages may take to reach their readers.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
+/// In a paced mission, how long a late command is waited for where ticks are shorter than that.
+const COMMAND_PATIENCE: Duration = PACED_PATIENCE.saturating_mul(2);
 /// States that may be without an answer: two ticks are under way at once.
 const IN_FLIGHT: usize = 2;
 
@@ -116,17 +119,22 @@ impl SpacecraftNode {
     }
 
     /// At a multiple of real time: a tick is integrated when its time has come.
+    ///
+    /// Where ticks are shorter than a decision may take, a late command is waited for, and the time lost is made up.
     fn fly_paced(&mut self) -> Result<()> {
         let tick = Duration::from_secs_f64(self.base.model.period.seconds() / self.pace);
         let mut due = Instant::now() + tick;
+        let mut latest = due.max(Instant::now() + COMMAND_PATIENCE);
         while !self.logic.done() && !self.base.shutdown.asked() {
             self.take_commands()?;
             let now = Instant::now();
-            if now < due {
-                self.base.node.wait(due - now)?;
+            let wanted = if self.logic.ready() { due } else { latest };
+            if now < wanted {
+                self.base.node.wait(wanted - now)?;
                 continue;
             }
             due += tick;
+            latest = due.max(now + COMMAND_PATIENCE);
             let sample = self.logic.advance();
             self.publish(&sample)?;
         }

@@ -110,13 +110,14 @@ pub fn json_lines(text: &str) -> Vec<serde_json::Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Looks again and again until something is found; tests give up after a minute.
+/// Looks again and again until something is found; tests give up after two minutes.
 pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    for _ in 0..600 {
+    let begin = std::time::Instant::now();
+    while begin.elapsed() < std::time::Duration::from_secs(120) {
         if let Some(found) = look() {
             return found;
         }
         std::thread::sleep(std::time::Duration::from_millis(100));
     }
-    panic!("{what} did not come within a minute");
+    panic!("{what} did not come within two minutes");
 }
