@@ -38,7 +38,7 @@ fn closed_loop(c: &mut Criterion) {
 
 fn environment(c: &mut Criterion) {
     let scenario = ScenarioConfig { count: [5000, 5000], ..ScenarioConfig::default() };
-    let mut env = Env::episode(model(), &EpisodeConfig { orbits: 1000.0, scenario }, 1);
+    let mut env = Env::episode(model(), &EpisodeConfig { orbits: 1000.0, scenario, ..EpisodeConfig::default() }, 1);
     let mut planner = Heuristic { t_pre_s: 80.0 };
     let set = ObservationSet::Table1;
     let (mut features, mut mask) = (vec![0.0; 40 * set.features()], vec![false; 40]);

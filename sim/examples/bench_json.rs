@@ -72,7 +72,7 @@ fn closed_loop(model: &Arc<Model>) -> Result<f64> {
 /// Environment steps with 5000 strips, N = 40, the observation written each time.
 fn decision_steps(model: &Arc<Model>) -> Result<f64> {
     let scenario = ScenarioConfig { count: [5000, 5000], ..ScenarioConfig::default() };
-    let config = EpisodeConfig { orbits: 15.0, scenario };
+    let config = EpisodeConfig { orbits: 15.0, scenario, ..EpisodeConfig::default() };
     let mut planner = Heuristic { t_pre_s: 80.0 };
     let set = ObservationSet::Table1;
     let mut features = vec![0.0; 40 * set.features()];
@@ -97,7 +97,7 @@ fn decision_steps(model: &Arc<Model>) -> Result<f64> {
 /// 99th percentile of a decision in a mission of 6 orbits with 5000 strips [ms].
 fn decision_p99(model: &Arc<Model>, planner: &mut dyn Planner) -> Result<f64> {
     let scenario = ScenarioConfig { count: [5000, 5000], ..ScenarioConfig::default() };
-    let mut env = Env::episode(model.clone(), &EpisodeConfig { orbits: 6.0, scenario }, 1);
+    let mut env = Env::episode(model.clone(), &EpisodeConfig { orbits: 6.0, scenario, ..EpisodeConfig::default() }, 1);
     let mut times = Vec::new();
     while !env.truncated() {
         let started = Instant::now();

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 use crate::catalogue::{Candidate, Catalogue};
@@ -11,6 +12,7 @@ use crate::guidance::{FailureReason, Task, TaskOutcome};
 use crate::model::Model;
 use crate::observation::{ObservationSet, observe};
 use crate::planner::{Decision, DecisionContext, Planner, PlannerError};
+use crate::plant_errors::PlantErrors;
 use crate::rng;
 use crate::scenario::{InitialState, ScenarioConfig};
 use crate::strip::{StripId, StripRequest};
@@ -24,11 +26,14 @@ pub struct EpisodeConfig {
     pub orbits: f64,
     /// Distribution of the requests.
     pub scenario: ScenarioConfig,
+    /// Share of the requests that come in flight, as a Poisson stream over the episode; the others are known at its
+    /// start.
+    pub arrivals: f64,
 }
 
 impl Default for EpisodeConfig {
     fn default() -> Self {
-        Self { orbits: 6.0, scenario: ScenarioConfig::default() }
+        Self { orbits: 6.0, scenario: ScenarioConfig::default(), arrivals: 0.0 }
     }
 }
 
@@ -36,7 +41,8 @@ impl EpisodeConfig {
     /// The paper's evaluation: 24 h, which it counts as 15 orbits, with 2000 to 5000 strips.
     #[must_use]
     pub fn evaluation() -> Self {
-        Self { orbits: 15.0, scenario: ScenarioConfig { count: [2000, 5000], ..ScenarioConfig::default() } }
+        let scenario = ScenarioConfig { count: [2000, 5000], ..ScenarioConfig::default() };
+        Self { orbits: 15.0, scenario, ..Self::default() }
     }
 
     /// Checks the length and the scenario.
@@ -45,6 +51,7 @@ impl EpisodeConfig {
     /// The first setting that is out of range.
     pub fn validate(&self) -> Result<(), SimError> {
         crate::config::in_range("orbits", self.orbits, 0.01, 10_000.0)?;
+        crate::config::in_range("arrivals", self.arrivals, 0.0, 1.0)?;
         self.scenario.validate()
     }
 }
@@ -57,7 +64,7 @@ const WINDOW_MARGIN_ORBITS: f64 = 1.5;
 pub struct TaskRecord {
     /// Number of the task, from 0.
     pub task: u64,
-    /// Tick at which it began.
+    /// Tick at which it began; a planning delay lies before it.
     pub start: Tick,
     /// Tick at which it ended.
     pub end: Tick,
@@ -105,7 +112,12 @@ pub struct Env {
     horizon: Tick,
     task: u64,
     situation: Situation,
+    previous: Option<TaskRecord>,
     candidates: Vec<Candidate>,
+    /// Requests that are still to come, the next one last.
+    to_come: Vec<(Tick, StripRequest)>,
+    /// Time from a situation to the start of the task decided on it [ticks].
+    planning_delay: u32,
 }
 
 impl Env {
@@ -115,7 +127,18 @@ impl Env {
         let mut flight = Flight::new(&model, &model, initial);
         let catalogue = Catalogue::new(&model, &flight.spacecraft.orbit, windows_until(&model, horizon));
         let situation = flight.situation();
-        Self { model, flight, catalogue, horizon, task: 0, situation, candidates: Vec::new() }
+        Self {
+            model,
+            flight,
+            catalogue,
+            horizon,
+            task: 0,
+            situation,
+            previous: None,
+            candidates: Vec::new(),
+            to_come: Vec::new(),
+            planning_delay: 0,
+        }
     }
 
     /// An episode drawn from a seed: initial state, number of strips and strips.
@@ -124,12 +147,25 @@ impl Env {
         let initial = InitialState::draw(&model.config, &mut rng::stream(seed, rng::INITIAL_STATE));
         let mut rng = rng::stream(seed, rng::CATALOGUE);
         let count = config.scenario.draw_count(&mut rng);
-        let requests = config.scenario.generate(&mut rng, count, model.config.earth.radius_m);
+        let mut requests = config.scenario.generate(&mut rng, count, model.config.earth.radius_m);
         let horizon = horizon(&model, config.orbits);
         let mut env = Self::new(model, &initial, horizon);
+        let known = count - (config.arrivals * count as f64).round() as usize;
+        env.to_come = arrivals(requests.split_off(known), horizon, seed);
         env.catalogue.add_all(&env.model, &requests, Tick(0));
         env.refresh();
         env
+    }
+
+    /// From now on the satellite differs from its model; `seed` is that of the sensors' noise.
+    ///
+    /// # Errors
+    /// When an error, or what it makes of the configuration, is out of range.
+    pub fn differ(&mut self, errors: &PlantErrors, seed: u64) -> Result<(), SimError> {
+        self.flight.differ(errors.plant(&self.model)?, errors.sensor(rng::stream(seed, rng::SENSORS)));
+        self.planning_delay = self.model.period.ticks_ceil(errors.planning_delay_s);
+        self.refresh();
+        Ok(())
     }
 
     /// Adds requests at the present decision. Each one's identity or refusal, in order.
@@ -155,6 +191,7 @@ impl Env {
             task: self.task,
             situation: &self.situation,
             candidates: &self.candidates,
+            previous: self.previous.as_ref(),
             model: &self.model,
         }
     }
@@ -233,6 +270,9 @@ impl Env {
             Task::Image { t_pre, t_acq, .. } => (t_pre, t_acq),
             Task::Wait { .. } => (0, 0),
         };
+        if self.planning_delay > 0 {
+            self.flight.fly(Task::Wait { ticks: self.planning_delay }, until);
+        }
         let start = self.now();
         let outcome = self.flight.fly(task, until);
         let reward = match (strip, outcome.failure) {
@@ -241,15 +281,29 @@ impl Env {
         };
         let record = TaskRecord { task: self.task, start, end: self.now(), strip, t_pre, t_acq, outcome, reward };
         self.task += 1;
+        self.previous = Some(record.clone());
         self.refresh();
         Ok(StepOutcome { record, truncated: self.truncated() })
     }
 
     fn refresh(&mut self) {
         self.situation = self.flight.situation();
+        while let Some((since, request)) = self.to_come.pop_if(|(tick, _)| *tick <= self.situation.now) {
+            // A request that cannot be flown is left out, as at the start.
+            _ = self.catalogue.add(&self.model, &request, since);
+        }
         let count = self.model.config.planning.candidates;
         self.catalogue.next(self.situation.now, count, &mut self.candidates);
     }
+}
+
+/// When each request comes: given their number, the events of a Poisson stream are uniform over its time.
+fn arrivals(requests: Vec<StripRequest>, horizon: Tick, seed: u64) -> Vec<(Tick, StripRequest)> {
+    let mut rng = rng::stream(seed, rng::ARRIVALS);
+    let mut arrivals: Vec<(Tick, StripRequest)> =
+        requests.into_iter().map(|request| (Tick(rng.random_range(0..horizon.0.max(1))), request)).collect();
+    arrivals.sort_by_key(|(tick, _)| std::cmp::Reverse(*tick));
+    arrivals
 }
 
 /// Tick at which a mission of a number of orbits ends.

@@ -35,6 +35,15 @@ pub enum SimError {
         /// The frequency given [Hz].
         frequency_hz: f64,
     },
+    /// A name that is no error of the plant.
+    #[error(
+        "`{name}` is no error of the plant: expected none, or torque-10%, inertia+5% and the like, noise and delay, \
+         joined by commas"
+    )]
+    UnknownPlantError {
+        /// The name given.
+        name: String,
+    },
     /// A strip that cannot be flown.
     #[error(transparent)]
     Strip(#[from] StripError),

@@ -6,6 +6,7 @@ use crate::dynamics::{BodyState, Plant};
 use crate::guidance::{Guidance, GuidanceTick, Task, TaskOutcome};
 use crate::model::Model;
 use crate::orbit::Orbit;
+use crate::plant_errors::Sensor;
 use crate::scenario::InitialState;
 use crate::time::Tick;
 
@@ -70,6 +71,17 @@ pub struct Flight {
     /// Its guidance computer.
     pub guidance: Guidance,
     torque_pending: Vector3<f64>,
+    seen: Option<Box<Seen>>,
+}
+
+/// What is seen of a satellite whose sensors are not exact.
+#[derive(Clone, Debug)]
+struct Seen {
+    sensor: Sensor,
+    /// The state as it is seen at the present tick.
+    body: BodyState,
+    /// Follows the task by the true state, to judge it.
+    judge: Guidance,
 }
 
 impl Flight {
@@ -80,7 +92,18 @@ impl Flight {
             spacecraft: Spacecraft::new(plant_model, initial),
             guidance: Guidance::new(guidance_model),
             torque_pending: Vector3::zeros(),
+            seen: None,
         }
+    }
+
+    /// From now on the satellite has another body and wheels than guidance believes, and what guidance and planners see
+    /// of it goes through a sensor.
+    pub fn differ(&mut self, plant: Plant, sensor: Option<Sensor>) {
+        self.spacecraft.plant = plant;
+        let body = self.spacecraft.body;
+        self.seen = sensor.map(|mut sensor| {
+            Box::new(Seen { body: sensor.measure(&body), sensor, judge: self.guidance.clone() })
+        });
     }
 
     /// A flight in a planner's head: from what is known of the satellite, by what the model says of it.
@@ -93,7 +116,8 @@ impl Flight {
             torque_applied: Vector3::zeros(),
             plant: model.plant.clone(),
         };
-        let mut flight = Self { spacecraft, guidance: Guidance::new(model), torque_pending: situation.torque_pending };
+        let guidance = Guidance::new(model);
+        let mut flight = Self { spacecraft, guidance, torque_pending: situation.torque_pending, seen: None };
         flight.guidance.servo_integral = situation.servo_integral;
         flight
     }
@@ -119,7 +143,7 @@ impl Flight {
             now,
             r_BN_N: self.spacecraft.orbit.position(now),
             v_BN_N: self.spacecraft.orbit.velocity(now),
-            body: self.spacecraft.body,
+            body: self.seen.as_ref().map_or(self.spacecraft.body, |seen| seen.body),
             servo_integral: self.guidance.servo_integral,
             torque_pending: self.torque_pending,
         }
@@ -129,12 +153,19 @@ impl Flight {
     pub fn fly(&mut self, task: Task, until: Tick) -> TaskOutcome {
         let start = self.now();
         let end = start.after(task.ticks()).min(until);
-        self.guidance.start(task, start, &self.spacecraft.body);
+        let body = &self.spacecraft.body;
+        self.guidance.start(task, start, self.seen.as_ref().map_or(body, |seen| &seen.body));
+        if let Some(seen) = &mut self.seen {
+            seen.judge.start(task, start, body);
+        }
         while self.now() < end {
             self.tick();
         }
         let r_BN_N = self.spacecraft.orbit.position(end);
-        self.guidance.finish(end, &r_BN_N, &self.spacecraft.body).unwrap_or(TaskOutcome::NOT_BEGUN)
+        let body = &self.spacecraft.body;
+        let outcome = self.guidance.finish(end, &r_BN_N, body);
+        let judged = self.seen.as_mut().and_then(|seen| seen.judge.finish(end, &r_BN_N, body));
+        judged.or(outcome).unwrap_or(TaskOutcome::NOT_BEGUN)
     }
 
     /// One closed-loop tick: the command computed from this tick's state waits while the previous one acts.
@@ -142,9 +173,18 @@ impl Flight {
     pub fn tick(&mut self) -> GuidanceTick {
         let spacecraft = &mut self.spacecraft;
         let r_BN_N = spacecraft.orbit.position(spacecraft.now);
-        let tick = self.guidance.tick(spacecraft.now, &r_BN_N, &spacecraft.body);
+        let tick = match &mut self.seen {
+            None => self.guidance.tick(spacecraft.now, &r_BN_N, &spacecraft.body),
+            Some(seen) => {
+                seen.judge.tick(spacecraft.now, &r_BN_N, &spacecraft.body);
+                self.guidance.tick(spacecraft.now, &r_BN_N, &seen.body)
+            }
+        };
         spacecraft.advance(&self.torque_pending);
         self.torque_pending = tick.torque;
+        if let Some(seen) = &mut self.seen {
+            seen.body = seen.sensor.measure(&spacecraft.body);
+        }
         tick
     }
 }

@@ -20,6 +20,7 @@ pub mod mrp;
 pub mod observation;
 pub mod orbit;
 pub mod planner;
+pub mod plant_errors;
 pub mod rng;
 pub mod scenario;
 pub mod strip;

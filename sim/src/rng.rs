@@ -13,6 +13,13 @@ pub const CATALOGUE: u64 = 1;
 /// Stream of a planner that draws at random.
 pub const PLANNER: u64 = 2;
 
+/// Stream of the sensors' noise.
+pub const SENSORS: u64 = 3;
+/// Stream of the times at which requests come in flight.
+pub const ARRIVALS: u64 = 4;
+/// Stream of a search that draws at random.
+pub const SEARCH: u64 = 5;
+
 /// Stream `number` of a seed.
 #[must_use]
 pub fn stream(seed: u64, number: u64) -> Rng {

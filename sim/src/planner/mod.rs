@@ -13,6 +13,7 @@ pub use spec::{PlannerSpec, UnknownPlanner};
 use thiserror::Error;
 
 use crate::catalogue::Candidate;
+use crate::env::TaskRecord;
 use crate::flight::Situation;
 use crate::guidance::Task;
 use crate::model::Model;
@@ -26,6 +27,8 @@ pub struct DecisionContext<'a> {
     pub situation: &'a Situation,
     /// The next N strips by closing time of their windows; at most `planning.candidates`.
     pub candidates: &'a [Candidate],
+    /// The task that ended here, and how; none at a mission's first decision.
+    pub previous: Option<&'a TaskRecord>,
     /// Constants of the mission.
     pub model: &'a Model,
 }

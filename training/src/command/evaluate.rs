@@ -81,7 +81,7 @@ impl MissionArgs {
         let scenario = ScenarioConfig { count: self.requests, ..ScenarioConfig::default() };
         Ok(Missions {
             simulation,
-            episode: EpisodeConfig { orbits: self.orbits, scenario },
+            episode: EpisodeConfig { orbits: self.orbits, scenario, ..EpisodeConfig::default() },
             first_seed: self.seed,
             count: self.episodes,
         })
