@@ -50,6 +50,12 @@ impl Plant {
         }
     }
 
+    /// The same with wheels whose torque limit is lower by a share.
+    #[must_use]
+    pub fn weakened(&self, share: f64) -> Self {
+        Self { torque_max: self.torque_max * (1.0 - share), ..self.clone() }
+    }
+
     /// What the wheels make of a torque command [N m]: clamped to their limit, and nothing that would speed up a wheel
     /// beyond its speed limit.
     #[inline]

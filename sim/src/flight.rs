@@ -101,9 +101,8 @@ impl Flight {
     pub fn differ(&mut self, plant: Plant, sensor: Option<Sensor>) {
         self.spacecraft.plant = plant;
         let body = self.spacecraft.body;
-        self.seen = sensor.map(|mut sensor| {
-            Box::new(Seen { body: sensor.measure(&body), sensor, judge: self.guidance.clone() })
-        });
+        self.seen = sensor
+            .map(|mut sensor| Box::new(Seen { body: sensor.measure(&body), sensor, judge: self.guidance.clone() }));
     }
 
     /// A flight in a planner's head: from what is known of the satellite, by what the model says of it.
@@ -186,5 +185,54 @@ impl Flight {
             seen.body = seen.sensor.measure(&spacecraft.body);
         }
         tick
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::SimConfig;
+    use crate::plant_errors::PlantErrors;
+    use crate::rng;
+    use crate::strip::StripRequest;
+
+    #[test]
+    fn a_noisy_flight_is_judged_by_the_true_attitude() {
+        let model = Model::new(SimConfig::default()).unwrap();
+        let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
+        let request = StripRequest {
+            start_latitude_deg: 10.0,
+            start_longitude_deg: 20.0,
+            end_latitude_deg: 12.0,
+            end_longitude_deg: 21.0,
+            priority: 0.5,
+            acquisition_speed_m_s: 3000.0,
+            bidirectional: false,
+        };
+        let strip = request.to_strip(&model.config.requests, model.config.earth.radius_m).unwrap();
+        let task = Task::Image { strip, t_pre: 200, t_acq: 100 };
+        let mut flight = Flight::new(&model, &model, &initial);
+        flight.differ(model.plant.clone(), PlantErrors::noise().sensor(rng::stream(1, rng::SENSORS)));
+        let mut by_hand = flight.clone();
+        let outcome = flight.fly(task, Tick(u64::MAX));
+
+        let mut truth = Guidance::new(&model);
+        truth.start(task, Tick(0), &by_hand.spacecraft.body);
+        let seen = by_hand.situation().body;
+        assert_ne!(seen, by_hand.spacecraft.body);
+        by_hand.guidance.start(task, Tick(0), &seen);
+        for _ in 0..task.ticks() {
+            let now = by_hand.now();
+            let r_BN_N = by_hand.spacecraft.orbit.position(now);
+            truth.tick(now, &r_BN_N, &by_hand.spacecraft.body);
+            by_hand.tick();
+        }
+        let now = by_hand.now();
+        let r_BN_N = by_hand.spacecraft.orbit.position(now);
+        assert_eq!(truth.finish(now, &r_BN_N, &by_hand.spacecraft.body), Some(outcome));
+        assert_eq!(flight.spacecraft.body, by_hand.spacecraft.body);
+        // What guidance saw of itself is something else.
+        let seen = by_hand.guidance.finish(now, &r_BN_N, &by_hand.spacecraft.body).unwrap();
+        assert_ne!(seen.max_attitude_error, outcome.max_attitude_error);
     }
 }

@@ -60,11 +60,7 @@ impl PlantErrors {
     /// Noise of a star tracker and a gyro of the small-satellite class.
     #[must_use]
     pub fn noise() -> Self {
-        Self {
-            attitude_noise_rad: STAR_TRACKER_NOISE_RAD,
-            rate_noise_rad_s: GYRO_NOISE_RAD_S,
-            ..Self::default()
-        }
+        Self { attitude_noise_rad: STAR_TRACKER_NOISE_RAD, rate_noise_rad_s: GYRO_NOISE_RAD_S, ..Self::default() }
     }
 
     /// Checks every value's range; NaN fails each of them.

@@ -7,7 +7,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
 use swath_sim::model::Model;
 use swath_sim::observation::ObservationSet;
-use swath_sim::planner::{Beam, Decision, Heuristic, Lookahead, Planner, Random};
+use swath_sim::planner::{Beam, BeamSearch, Decision, Heuristic, Lookahead, Planner, Random};
 
 fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<TaskRecord> {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());
@@ -109,7 +109,7 @@ fn the_beam_beats_the_greedy_lookahead_and_never_fails() {
 #[test]
 fn a_beam_without_a_budget_still_decides() {
     let mut totals = Totals::default();
-    for record in fly(&mut Beam { budget: 0, ..Beam::default() }, 1) {
+    for record in fly(&mut Beam::new(BeamSearch { budget: 0, ..BeamSearch::default() }), 1) {
         totals.add(&record);
     }
     assert!(totals.fulfilled > 60 && totals.failed_attitude == 0, "{totals:?}");

@@ -2,7 +2,9 @@
 
 use swath_sim::catalogue::Candidate;
 use swath_sim::observation::observe;
-use swath_sim::planner::{Beam, Decision, DecisionContext, Planner, PlannerError, Rationale, Sequence};
+use swath_sim::planner::{
+    Allowance, BeamSearch, Decision, DecisionContext, Experience, Planner, PlannerError, Rationale, Sequence,
+};
 
 use crate::error::{Result, TrainingError};
 use crate::policy::{Judgement, LearnedPlanner, Policy};
@@ -16,6 +18,7 @@ pub struct PolicyLookahead {
     /// Discount of the critic, per second.
     gamma: f64,
     judgement: Option<Judgement>,
+    experience: Experience,
 }
 
 /// Strips that are flown in the head, the most probable first.
@@ -26,14 +29,14 @@ impl PolicyLookahead {
     #[must_use]
     pub fn new(policy: Policy) -> Self {
         let gamma = policy.run().ppo.gamma;
-        Self { learned: LearnedPlanner::new(policy), gamma, judgement: None }
+        Self { learned: LearnedPlanner::new(policy), gamma, judgement: None, experience: Experience::default() }
     }
 
-    fn best(&self, context: &DecisionContext<'_>, judgement: &Judgement) -> Result<Decision> {
+    fn best(&self, context: &DecisionContext<'_>, judgement: &Judgement, allowance: &Allowance) -> Result<Decision> {
         let proposals = proposals(context.candidates, judgement);
         let strips: Vec<Candidate> = proposals.iter().map(|&i| context.candidates[i]).collect();
         let narrowed = DecisionContext { candidates: &strips, ..*context };
-        let sequences = Beam::default().sequences(&narrowed);
+        let sequences = BeamSearch::default().sequences(&narrowed, allowance);
         let values = self.values(context, &narrowed, &sequences)?;
         let worth = |(sequence, value): (&Sequence, f32)| self.worth(&narrowed, sequence, value);
         let best = sequences.iter().zip(values).max_by(|a, b| worth(*a).total_cmp(&worth(*b)));
@@ -104,12 +107,14 @@ impl Planner for PolicyLookahead {
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {
         self.judgement = None;
+        let allowance = self.experience.learn(context);
         if context.candidates.is_empty() {
             return self.learned.decide(context);
         }
         let failed = |error: TrainingError| PlannerError::Policy(error.to_string());
         let judgement = self.learned.consider(context).map_err(failed)?;
-        let decision = self.best(context, &judgement).map_err(failed)?;
+        let decision = self.best(context, &judgement, &allowance).map_err(failed)?;
+        self.experience.remember(context, decision);
         self.judgement = Some(judgement);
         Ok(decision)
     }

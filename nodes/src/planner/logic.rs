@@ -1,6 +1,7 @@
 //! The planner node without ROS: it decides when both the situation and the candidates of a task are known.
 
 use swath_sim::catalogue::Candidate;
+use swath_sim::env::TaskRecord;
 use swath_sim::flight::Situation;
 use swath_sim::guidance::Task;
 use swath_sim::model::Model;
@@ -42,7 +43,7 @@ pub struct PlannerLogic {
     model: Model,
     planner: GuardedPlanner,
     gate: Gate,
-    point: Option<(u64, Situation)>,
+    point: Option<(u64, Situation, Option<TaskRecord>)>,
     upcoming: Option<Upcoming>,
     decided: Option<u64>,
 }
@@ -54,9 +55,14 @@ impl PlannerLogic {
         Self { model, planner, gate, point: None, upcoming: None, decided: None }
     }
 
-    /// A task is wanted.
-    pub fn on_decision_point(&mut self, task: u64, situation: Situation) -> Option<Planned> {
-        self.point = Some((task, situation));
+    /// A task is wanted; `previous` is the one that ended here.
+    pub fn on_decision_point(
+        &mut self,
+        task: u64,
+        situation: Situation,
+        previous: Option<TaskRecord>,
+    ) -> Option<Planned> {
+        self.point = Some((task, situation, previous));
         self.decide()
     }
 
@@ -90,14 +96,15 @@ impl PlannerLogic {
     }
 
     fn decide(&mut self) -> Option<Planned> {
-        let (task, situation) = self.point?;
+        let &(task, situation, ref previous) = self.point.as_ref()?;
         let upcoming = self.upcoming.as_ref().filter(|upcoming| upcoming.task == task)?;
         if self.decided.is_some_and(|decided| decided >= task) {
             return None;
         }
         let candidates = &upcoming.candidates;
         let (gate, planner, model) = (&mut self.gate, &mut self.planner, &self.model);
-        let context = DecisionContext { task, situation: &situation, candidates, model };
+        let previous = previous.as_ref();
+        let context = DecisionContext { task, situation: &situation, candidates, previous, model };
         // The guarded planner's decisions are allowed ones: the heuristic waits when nothing else is left.
         let plan = |left: &[Candidate]| planner.decide(&DecisionContext { candidates: left, ..context });
         let decision = gate.decide(situation.now, candidates, plan).ok()?;
@@ -162,13 +169,13 @@ mod tests {
             )
         };
         let mut first = make();
-        assert_eq!(first.on_decision_point(0, situation), None);
+        assert_eq!(first.on_decision_point(0, situation, None), None);
         let planned = first.on_upcoming(upcoming(&env, 0)).unwrap();
-        assert_eq!(first.on_decision_point(0, situation), None, "a repeated question is not answered twice");
+        assert_eq!(first.on_decision_point(0, situation, None), None, "a repeated question is not answered twice");
         let mut second = make();
         assert_eq!(second.on_upcoming(upcoming(&env, 0)), None);
-        assert_eq!(second.on_decision_point(0, situation), Some(planned));
-        assert_eq!(second.on_decision_point(1, situation), None, "candidates of another task do not count");
+        assert_eq!(second.on_decision_point(0, situation, None), Some(planned));
+        assert_eq!(second.on_decision_point(1, situation, None), None, "candidates of another task do not count");
     }
 
     #[test]
@@ -176,7 +183,7 @@ mod tests {
         let env = env();
         let planner = GuardedPlanner::new(Box::new(Broken));
         let mut logic = PlannerLogic::new((**env.model()).clone(), planner, gate(env.model()));
-        logic.on_decision_point(0, *env.context().situation);
+        logic.on_decision_point(0, *env.context().situation, None);
         let planned = logic.on_upcoming(upcoming(&env, 0)).unwrap();
         assert_eq!(planned.planner, "heuristic:90");
         assert!(planned.fault.unwrap().contains("candidate 40 was chosen of 40"));

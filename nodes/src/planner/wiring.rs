@@ -93,9 +93,10 @@ impl PlannerNode {
                 continue;
             }
             let started = Instant::now();
-            match from_msg::situation(&point) {
-                Ok(situation) => {
-                    let planned = self.logic.on_decision_point(point.task, situation);
+            let previous = point.result.first().map(from_msg::task_record).transpose();
+            match from_msg::situation(&point).and_then(|situation| Ok((situation, previous?))) {
+                Ok((situation, previous)) => {
+                    let planned = self.logic.on_decision_point(point.task, situation, previous);
                     self.publish(planned, started)?;
                 }
                 Err(error) => self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?,

@@ -6,7 +6,7 @@ mod random;
 mod spec;
 
 pub use heuristic::Heuristic;
-pub use lookahead::{Beam, Found, Lookahead, Search, Sequence, wait_for_a_window};
+pub use lookahead::{Allowance, Beam, BeamSearch, Experience, Found, Lookahead, Search, Sequence, wait_for_a_window};
 pub use random::Random;
 pub use spec::{PlannerSpec, UnknownPlanner};
 

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Beam, Heuristic, Lookahead, Planner, Random};
+use super::{Beam, BeamSearch, Heuristic, Lookahead, Planner, Random};
 
 /// Kinds of policies: hybrid ones with a transformer, with an MLP, standard hybrid PPO, and PPO over a grid.
 const KINDS: [&str; 4] = ["hop-ppo", "hop-ppo-mlp", "h-ppo", "discrete-ppo"];
@@ -20,16 +20,16 @@ const MARGIN_MAX: u32 = 240;
 /// Longest fixed transition [s].
 const T_PRE_MAX_S: f64 = 600.0;
 
-/// A planner by name: `lookahead`, `lookahead:TICKS`, `beam`, `beam:WIDTHxDEPTH`, `heuristic:SECONDS`, `random`, or a
+/// A planner by name: `lookahead`, `lookahead:TICKS` for a margin that is not adapted, `beam`, `beam:WIDTHxDEPTH`, `heuristic:SECONDS`, `random`, or a
 /// kind of policy such as `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another; with
 /// `hop-ppo+lookahead` its proposals are flown in the head.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum PlannerSpec {
-    /// Flies each candidate in its head; the margin is added to each transition [ticks].
-    Lookahead(u32),
+    /// Flies each candidate in its head; with a margin [ticks] it adds that to each transition and adapts nothing.
+    Lookahead(Option<u32>),
     /// Flies sequences of candidates in its head.
-    Beam(Beam),
+    Beam(BeamSearch),
     /// The paper's heuristic with a fixed transition time [s].
     Heuristic(f64),
     /// A uniform strip and a uniform transition time.
@@ -55,7 +55,7 @@ pub struct UnknownPlanner {
 
 impl Default for PlannerSpec {
     fn default() -> Self {
-        Self::Lookahead(0)
+        Self::Lookahead(None)
     }
 }
 
@@ -67,12 +67,12 @@ impl FromStr for PlannerSpec {
         let (word, rest) = name.split_once(':').map_or((name, None), |(word, rest)| (word, Some(rest)));
         match (word, rest) {
             ("random", None) => Ok(Self::Random),
-            ("lookahead", None) => Ok(Self::Lookahead(0)),
+            ("lookahead", None) => Ok(Self::Lookahead(None)),
             ("lookahead", Some(ticks)) => match ticks.parse() {
-                Ok(margin) if margin <= MARGIN_MAX => Ok(Self::Lookahead(margin)),
+                Ok(margin) if margin <= MARGIN_MAX => Ok(Self::Lookahead(Some(margin))),
                 _ => Err(unknown("the margin must be a whole number of ticks from 0 to 240")),
             },
-            ("beam", None) => Ok(Self::Beam(Beam::default())),
+            ("beam", None) => Ok(Self::Beam(BeamSearch::default())),
             ("beam", Some(shape)) => beam(shape)
                 .ok_or_else(|| unknown("the beam must be WIDTHxDEPTH, with a width of 1 to 64 and a depth of 1 to 8")),
             ("heuristic", Some(seconds)) => match seconds.parse() {
@@ -99,7 +99,7 @@ fn beam(shape: &str) -> Option<PlannerSpec> {
     let (width, depth) = shape.split_once('x')?;
     let (width, depth) = (width.parse().ok()?, depth.parse().ok()?);
     let fits = (1..=64).contains(&width) && (1..=8).contains(&depth);
-    fits.then(|| PlannerSpec::Beam(Beam { width, depth, ..Beam::default() }))
+    fits.then(|| PlannerSpec::Beam(BeamSearch { width, depth, ..BeamSearch::default() }))
 }
 
 impl TryFrom<String> for PlannerSpec {
@@ -119,9 +119,9 @@ impl From<PlannerSpec> for String {
 impl fmt::Display for PlannerSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Lookahead(0) => write!(f, "lookahead"),
-            Self::Lookahead(margin) => write!(f, "lookahead:{margin}"),
-            Self::Beam(beam) if *beam == Beam::default() => write!(f, "beam"),
+            Self::Lookahead(None) => write!(f, "lookahead"),
+            Self::Lookahead(Some(margin)) => write!(f, "lookahead:{margin}"),
+            Self::Beam(beam) if *beam == BeamSearch::default() => write!(f, "beam"),
             Self::Beam(beam) => write!(f, "beam:{}x{}", beam.width, beam.depth),
             Self::Heuristic(t_pre_s) => write!(f, "heuristic:{t_pre_s}"),
             Self::Random => write!(f, "random"),
@@ -138,8 +138,8 @@ impl PlannerSpec {
     #[must_use]
     pub fn hand_written(&self, seed: u64) -> Option<Box<dyn Planner + Send>> {
         match *self {
-            Self::Lookahead(margin) => Some(Box::new(Lookahead { margin })),
-            Self::Beam(beam) => Some(Box::new(beam)),
+            Self::Lookahead(margin) => Some(Box::new(margin.map_or_else(Lookahead::default, Lookahead::with_margin))),
+            Self::Beam(beam) => Some(Box::new(Beam::new(beam))),
             Self::Heuristic(t_pre_s) => Some(Box::new(Heuristic { t_pre_s })),
             Self::Random => Some(Box::new(Random { seed })),
             Self::Learned { .. } => None,
@@ -163,6 +163,7 @@ mod tests {
         for name in [
             "lookahead",
             "lookahead:4",
+            "lookahead:0",
             "heuristic:90",
             "heuristic:72.5",
             "random",

@@ -3,28 +3,34 @@
 use super::super::{Decision, DecisionContext, Planner, PlannerError};
 use super::search::Search;
 use super::wait_for_a_window;
+use super::{Allowance, Experience};
 use crate::catalogue::Candidate;
 use crate::flight::Situation;
+
+/// Beam search planner.
+#[derive(Clone, Debug, Default)]
+pub struct Beam {
+    search: BeamSearch,
+    experience: Experience,
+}
 
 /// Beam search over sequences of candidates, each with the shortest transition that succeeds.
 ///
 /// A sequence is worth the sum of its priorities over the time it takes. The search is cut off after a number of ticks
 /// flown in the head, not after a time, so that the same situation always gives the same decision.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beam {
+pub struct BeamSearch {
     /// Sequences kept at each length.
     pub width: usize,
     /// Tasks of a sequence.
     pub depth: usize,
-    /// Added to each transition found, against errors of the model [ticks].
-    pub margin: u32,
     /// Closed-loop ticks after which the best sequence found so far must do.
     pub budget: u64,
 }
 
-impl Default for Beam {
+impl Default for BeamSearch {
     fn default() -> Self {
-        Self { width: 8, depth: 3, margin: 0, budget: 120_000 }
+        Self { width: 8, depth: 3, budget: 120_000 }
     }
 }
 
@@ -61,26 +67,37 @@ impl Sequence {
     }
 }
 
+impl Beam {
+    /// A planner with no experience yet.
+    #[must_use]
+    pub fn new(search: BeamSearch) -> Self {
+        Self { search, experience: Experience::default() }
+    }
+}
+
 impl Planner for Beam {
     fn name(&self) -> String {
         "beam".to_owned()
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
-        let best = self.sequences(context).into_iter().next();
-        Ok(best.map_or_else(
+        let allowance = self.experience.learn(context);
+        let best = self.search.sequences(context, &allowance).into_iter().next();
+        let decision = best.map_or_else(
             || wait_for_a_window(context),
             |best| Decision::Image { candidate: best.imaged[0], t_pre: best.first_t_pre },
-        ))
+        );
+        self.experience.remember(context, decision);
+        Ok(decision)
     }
 }
 
-impl Beam {
+impl BeamSearch {
     /// The best sequences, best first, of at least one task each; none when nothing can be imaged now.
     #[must_use]
-    pub fn sequences(&self, context: &DecisionContext<'_>) -> Vec<Sequence> {
-        let mut search = Search::new(context.model, context.situation, self.margin);
-        let mut beam = vec![Sequence::new(*context.situation)];
+    pub fn sequences(&self, context: &DecisionContext<'_>, allowance: &Allowance) -> Vec<Sequence> {
+        let mut search = Search::new(context.model, context.situation, allowance);
+        let mut beam = vec![Sequence::new(search.begin)];
         for _ in 0..self.depth {
             let mut next = Vec::new();
             for sequence in &beam {

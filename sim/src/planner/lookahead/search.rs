@@ -1,5 +1,6 @@
 //! The shortest transition with which a strip is imaged, found by flying it.
 
+use super::Allowance;
 use crate::catalogue::Candidate;
 use crate::flight::{Flight, Situation};
 use crate::guidance::Task;
@@ -19,6 +20,8 @@ pub struct Search<'a> {
     flight: Flight,
     margin: u32,
     sigma_max: f64,
+    /// Where the next task begins.
+    pub begin: Situation,
     /// Closed-loop ticks flown so far.
     pub ticks: u64,
 }
@@ -33,12 +36,20 @@ pub struct Found {
 }
 
 impl<'a> Search<'a> {
-    /// Flights with a model of the satellite, on the orbit of a situation; `margin` [ticks] is added to every transition
-    /// found.
+    /// Flights with a model of the satellite, on the orbit of a situation.
     #[must_use]
-    pub fn new(model: &'a Model, situation: &Situation, margin: u32) -> Self {
-        let flight = Flight::predicted(model, situation);
-        Self { model, flight, margin, sigma_max: model.config.imaging.sigma_max, ticks: 0 }
+    pub fn new(model: &'a Model, situation: &Situation, allowance: &Allowance) -> Self {
+        let mut flight = Flight::predicted(model, situation);
+        if allowance.weakness > 0.0 {
+            flight.differ(model.plant.weakened(allowance.weakness), None);
+        }
+        let mut begin = *situation;
+        if allowance.delay > 0 {
+            flight.fly(Task::Wait { ticks: allowance.delay }, Tick(u64::MAX));
+            begin = flight.situation();
+        }
+        let sigma_max = model.config.imaging.sigma_max;
+        Self { model, flight, margin: allowance.ticks, sigma_max, begin, ticks: u64::from(allowance.delay) }
     }
 
     /// Shortest and longest transition after which the candidate's window is open [ticks].
