@@ -14,6 +14,7 @@ pub mod dynamics;
 pub mod env;
 pub mod error;
 pub mod flight;
+pub mod ground;
 pub mod guidance;
 pub mod model;
 pub mod mrp;

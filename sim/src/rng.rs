@@ -17,8 +17,6 @@ pub const PLANNER: u64 = 2;
 pub const SENSORS: u64 = 3;
 /// Stream of the times at which requests come in flight.
 pub const ARRIVALS: u64 = 4;
-/// Stream of a search that draws at random.
-pub const SEARCH: u64 = 5;
 
 /// Stream `number` of a seed.
 #[must_use]

@@ -8,6 +8,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::env::{Env, EpisodeConfig, Totals};
 use swath_sim::model::Model;
 use swath_sim::planner::{Planner, PlannerSpec};
+use swath_sim::plant_errors::PlantErrors;
 
 use crate::error::{Result, TrainingError};
 use crate::planners;
@@ -19,6 +20,8 @@ pub struct Missions {
     pub simulation: SimConfig,
     /// Length and requests.
     pub episode: EpisodeConfig,
+    /// How the satellite flown differs from the one that planners believe in.
+    pub plant: PlantErrors,
     /// Seed of the first mission; the others follow it.
     pub first_seed: u64,
     /// How many.
@@ -30,7 +33,7 @@ pub struct Missions {
 pub struct Mission {
     /// Its seed.
     pub seed: u64,
-    /// Strips asked for.
+    /// Strips asked for by its end, without those that could not be flown.
     pub requests: usize,
     /// Sum of the priorities of imaged strips, per orbit.
     pub reward_per_orbit: f64,
@@ -78,7 +81,8 @@ pub fn fly(missions: &Missions, planners: &[PlannerSpec]) -> Result<Vec<Vec<Miss
         .into_par_iter()
         .map(|seed| {
             // One catalogue serves all planners: its windows take longer than flying.
-            let env = Env::episode(model.clone(), &missions.episode, seed);
+            let mut env = Env::episode(model.clone(), &missions.episode, seed);
+            env.differ(&missions.plant, seed).map_err(failed)?;
             let flown = planners.iter().map(|spec| {
                 let mut planner = planners::make(spec, seed)?;
                 mission(env.clone(), planner.as_mut(), seed, missions.episode.orbits)
@@ -90,8 +94,11 @@ pub fn fly(missions: &Missions, planners: &[PlannerSpec]) -> Result<Vec<Vec<Miss
     Ok((0..planners.len()).map(of).collect())
 }
 
-fn mission(mut env: Env, planner: &mut dyn Planner, seed: u64, orbits: f64) -> Result<Mission> {
-    let requests = env.catalogue().len();
+/// Flies one mission to its end and adds up.
+///
+/// # Errors
+/// When the planner fails.
+pub fn mission(mut env: Env, planner: &mut dyn Planner, seed: u64, orbits: f64) -> Result<Mission> {
     let period = env.model().period;
     let mut totals = Totals::default();
     env.run(planner, |record| totals.add(record)).map_err(|error| TrainingError::Environment(error.to_string()))?;
@@ -99,7 +106,7 @@ fn mission(mut env: Env, planner: &mut dyn Planner, seed: u64, orbits: f64) -> R
     let seconds = |ticks: u64| ticks as f64 * period.seconds();
     Ok(Mission {
         seed,
-        requests,
+        requests: env.catalogue().len(),
         reward_per_orbit: totals.reward / orbits,
         success_rate: totals.success_rate(),
         attempts_per_orbit: attempts / orbits,

@@ -9,6 +9,7 @@ pub mod error;
 pub mod evaluate;
 pub mod figures;
 pub mod gae;
+pub mod ground;
 pub mod lookahead;
 pub mod network;
 pub mod parameters;

@@ -19,8 +19,12 @@ struct Cli {
 enum Command {
     /// Train a planner, or go on with a run
     Train(command::train::TrainArgs),
+    /// Plan whole missions on the ground, fly the plans blindly, and say what no plan can exceed
+    GroundPlan(command::ground_plan::GroundPlanArgs),
     /// Fly the same missions with several planners and compare them
     Evaluate(command::evaluate::EvaluateArgs),
+    /// Plan whole missions on the ground, fly the plans blindly, and say what no plan can exceed
+    GroundPlan(command::ground_plan::GroundPlanArgs),
     /// Fly the heuristic with fixed transition times of 10 to 120 s
     Sweep(command::evaluate::SweepArgs),
     /// Draw the paper's Figures 3, 4 and 5 from recorded runs and evaluations
@@ -31,6 +35,7 @@ fn main() -> ExitCode {
     process::prepare();
     let outcome = match Cli::parse().command {
         Command::Train(args) => command::train::train(&args),
+        Command::GroundPlan(args) => command::ground_plan::ground_plan(&args),
         Command::Evaluate(args) => command::evaluate::evaluate(&args),
         Command::Sweep(args) => command::evaluate::sweep(&args),
         Command::Figures(args) => command::figures::figures(&args),

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use swath_sim::config::SimConfig;
 use swath_sim::env::EpisodeConfig;
 use swath_sim::planner::PlannerSpec;
+use swath_sim::plant_errors::PlantErrors;
 use swath_sim::scenario::ScenarioConfig;
 use swath_training::evaluate::{Mission, Missions, Spread, fly, spread, spread_of};
 use swath_training::process;
@@ -28,12 +29,45 @@ pub struct MissionArgs {
     /// Seed of the first mission
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Share of the strips that come in flight, as a Poisson stream; the others are known at the start
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    arrivals: f64,
     /// Simulation settings as TOML; the paper's by default
     #[arg(long, value_name = "FILE")]
     simulation: Option<PathBuf>,
     /// Threads; results do not depend on it
     #[arg(long, default_value_t = super::cores())]
     threads: usize,
+}
+
+/// How the satellite flown differs from the one that its guidance and planner believe in.
+#[derive(Debug, Args)]
+pub struct PlantArgs {
+    /// Errors of the plant: none, or torque-10%, inertia+5% and the like, noise and delay, joined by commas, or a TOML
+    /// file; may be given several times, for a table each
+    #[arg(long = "plant", value_name = "NAME|FILE")]
+    plants: Vec<String>,
+}
+
+impl PlantArgs {
+    /// The plants by name; the exact one when none was asked for.
+    pub fn named(&self) -> Result<Vec<(String, PlantErrors)>> {
+        if self.plants.is_empty() {
+            return Ok(vec![("none".to_owned(), PlantErrors::default())]);
+        }
+        self.plants.iter().map(|name| Ok((name.clone(), plant(name)?))).collect()
+    }
+}
+
+fn plant(name: &str) -> Result<PlantErrors> {
+    let path = Path::new(name);
+    if path.extension().is_none_or(|extension| extension != "toml") {
+        return Ok(name.parse()?);
+    }
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
+    let errors: PlantErrors = toml::from_str(&text).with_context(|| format!("{name} is not valid"))?;
+    errors.validate().with_context(|| format!("{name} is not valid"))?;
+    Ok(errors)
 }
 
 /// Options of `swath-train evaluate`.
@@ -43,6 +77,8 @@ pub struct EvaluateArgs {
     /// discrete-ppo:FILE; may be given several times, the first is what others are compared with
     #[arg(long = "planner", required = true)]
     planners: Vec<PlannerSpec>,
+    #[command(flatten)]
+    plants: PlantArgs,
     #[command(flatten)]
     missions: MissionArgs,
     /// Write everything, every mission included, to this file (- for standard output)
@@ -69,7 +105,8 @@ fn range(text: &str) -> Result<[u32; 2], String> {
 }
 
 impl MissionArgs {
-    fn missions(&self) -> Result<Missions> {
+    /// The missions, on the plant without errors.
+    pub fn missions(&self) -> Result<Missions> {
         process::make_threads(self.threads)?;
         let simulation = match &self.simulation {
             None => SimConfig::default(),
@@ -81,37 +118,59 @@ impl MissionArgs {
         let scenario = ScenarioConfig { count: self.requests, ..ScenarioConfig::default() };
         Ok(Missions {
             simulation,
-            episode: EpisodeConfig { orbits: self.orbits, scenario, ..EpisodeConfig::default() },
+            episode: EpisodeConfig { orbits: self.orbits, scenario, arrivals: self.arrivals },
+            plant: PlantErrors::default(),
             first_seed: self.seed,
             count: self.episodes,
         })
     }
 
-    fn describe(&self) -> Value {
+    /// What was asked for.
+    pub fn describe(&self) -> Value {
         json!({
             "episodes": self.episodes,
             "orbits": self.orbits,
             "requests": self.requests,
             "first_seed": self.seed,
+            "arrivals": self.arrivals,
         })
     }
 }
 
 /// Runs `evaluate`.
 pub fn evaluate(args: &EvaluateArgs) -> Result<()> {
-    let missions = args.missions.missions()?;
-    let flown = fly(&missions, &args.planners)?;
-    let results = args.planners.iter().zip(&flown);
-    let entries: Vec<Value> = results.clone().map(|(planner, own)| entry(planner, own, &flown[0])).collect();
-    let mut table = String::from(HEADING);
-    for (planner, own) in results {
-        table += &row(&planner.to_string(), own, &flown[0]);
+    let mut missions = args.missions.missions()?;
+    let (plants, mut by_plant) = (args.plants.named()?, Vec::new());
+    for (name, errors) in &plants {
+        missions.plant = errors.clone();
+        let flown = fly(&missions, &args.planners)?;
+        let base = best_fixed(&args.planners, &flown);
+        let results = args.planners.iter().zip(&flown);
+        let entries: Vec<Value> = results.clone().map(|(planner, own)| entry(planner, own, &flown[0], base)).collect();
+        by_plant.push(json!({ "plant": name, "errors": errors, "planners": entries }));
+        let mut table = if args.plants.plants.is_empty() { String::new() } else { format!("plant {name}\n") };
+        table += HEADING;
+        for (planner, own) in results {
+            table += &row(&planner.to_string(), own, &flown[0], base);
+        }
+        if args.json.as_deref() != Some(Path::new("-")) {
+            print(&table)?;
+        }
     }
-    if args.json.as_deref() != Some(Path::new("-")) {
-        print(&table)?;
+    let mut whole = json!({ "missions": args.missions.describe() });
+    if args.plants.plants.is_empty() {
+        whole["planners"] = by_plant[0]["planners"].take();
+    } else {
+        whole["plants"] = json!(by_plant);
     }
-    let whole = json!({ "missions": args.missions.describe(), "planners": entries });
     args.json.as_deref().map_or(Ok(()), |path| write_json(path, &whole))
+}
+
+/// Missions of the heuristic with the best fixed transition time, if one was flown.
+fn best_fixed<'a>(planners: &[PlannerSpec], flown: &'a [Vec<Mission>]) -> Option<&'a [Mission]> {
+    let fixed = planners.iter().zip(flown).filter(|(planner, _)| matches!(planner, PlannerSpec::Heuristic(_)));
+    let reward = |own: &[Mission]| spread(own, |it| it.reward_per_orbit).mean;
+    fixed.map(|(_, own)| own.as_slice()).max_by(|a, b| reward(a).total_cmp(&reward(b)))
 }
 
 /// Runs `sweep`: the fixed-T heuristic with T of 10 to 120 s.
@@ -141,23 +200,24 @@ pub fn sweep(args: &SweepArgs) -> Result<()> {
     }
     let mut table = String::from(HEADING);
     for (planner, own) in planners.iter().zip(&flown) {
-        table += &row(&planner.to_string(), own, &flown[0]);
+        table += &row(&planner.to_string(), own, &flown[0], best_fixed(&planners, &flown));
     }
     print(&format!("{table}\nbest: T* = {best_s} s\n"))
 }
 
 const HEADING: &str = "\
-planner                            reward/orbit   ± 95 %  deviation  of first  success  attempts  imaged  T_pre s  T_acq s  priority\n";
+planner                            reward/orbit   ± 95 %  deviation  of first    of T*  success  attempts  imaged  T_pre s  T_acq s  priority\n";
 
-fn row(name: &str, own: &[Mission], first: &[Mission]) -> String {
+fn row(name: &str, own: &[Mission], first: &[Mission], best_fixed: Option<&[Mission]>) -> String {
     let reward = spread(own, |it| it.reward_per_orbit);
     let mean = |quantity: fn(&Mission) -> f64| spread(own, quantity).mean;
     format!(
-        "{name:<34} {:>12.3} {:>8.3} {:>10.3} {:>8.1}% {:>7.1}% {:>9.1} {:>7.1} {:>8.1} {:>8.1} {:>9.3}\n",
+        "{name:<34} {:>12.3} {:>8.3} {:>10.3} {:>8.1}% {:>8} {:>7.1}% {:>9.1} {:>7.1} {:>8.1} {:>8.1} {:>9.3}\n",
         reward.mean,
         reward.confidence_95,
         reward.deviation,
         gain(own, first).mean * 100.0,
+        best_fixed.map_or_else(|| "-".to_owned(), |base| format!("{:.1}%", gain(own, base).mean * 100.0)),
         pooled_success(own) * 100.0,
         mean(|it| it.attempts_per_orbit),
         mean(|it| it.imaged_per_orbit),
@@ -168,7 +228,7 @@ fn row(name: &str, own: &[Mission], first: &[Mission]) -> String {
 }
 
 /// Successes over attempts of all missions together.
-fn pooled_success(own: &[Mission]) -> f64 {
+pub(super) fn pooled_success(own: &[Mission]) -> f64 {
     let sum = |quantity: fn(&Mission) -> f64| own.iter().map(quantity).sum::<f64>();
     sum(|it| it.imaged_per_orbit) / sum(|it| it.attempts_per_orbit)
 }
@@ -182,10 +242,11 @@ fn gain(own: &[Mission], first: &[Mission]) -> Spread {
     spread_of(&differences)
 }
 
-fn entry(planner: &PlannerSpec, own: &[Mission], first: &[Mission]) -> Value {
+fn entry(planner: &PlannerSpec, own: &[Mission], first: &[Mission], best_fixed: Option<&[Mission]>) -> Value {
     let mut entry = summary(own);
     entry["planner"] = json!(planner.to_string());
     entry["gain_over_first"] = json!(gain(own, first));
+    entry["gain_over_best_fixed"] = json!(best_fixed.map(|base| gain(own, base)));
     entry["by_density"] = json!(by_density(own));
     entry["missions"] = json!(own);
     entry
@@ -222,7 +283,7 @@ fn by_density(own: &[Mission]) -> Vec<Value> {
     summarised.collect()
 }
 
-fn write_json(path: &Path, value: &Value) -> Result<()> {
+pub(super) fn write_json(path: &Path, value: &Value) -> Result<()> {
     let text = serde_json::to_string_pretty(value).context("cannot write the results as JSON")?;
     if path == Path::new("-") {
         return print(&(text + "\n"));
@@ -230,7 +291,7 @@ fn write_json(path: &Path, value: &Value) -> Result<()> {
     std::fs::write(path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
 }
 
-fn print(text: &str) -> Result<()> {
+pub(super) fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).context("cannot write to standard output")
 }

@@ -2,6 +2,7 @@
 
 pub mod evaluate;
 pub mod figures;
+pub mod ground_plan;
 pub mod train;
 
 fn cores() -> usize {
