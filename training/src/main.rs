@@ -23,8 +23,6 @@ enum Command {
     GroundPlan(command::ground_plan::GroundPlanArgs),
     /// Fly the same missions with several planners and compare them
     Evaluate(command::evaluate::EvaluateArgs),
-    /// Plan whole missions on the ground, fly the plans blindly, and say what no plan can exceed
-    GroundPlan(command::ground_plan::GroundPlanArgs),
     /// Fly the heuristic with fixed transition times of 10 to 120 s
     Sweep(command::evaluate::SweepArgs),
     /// Draw the paper's Figures 3, 4 and 5 from recorded runs and evaluations
