@@ -121,7 +121,8 @@ impl InProcessMission {
             return Ok(None);
         }
         let candidates = &offer.candidates;
-        let context = DecisionContext { task, situation: &situation, candidates, model: &self.model };
+        let previous = self.finished.as_ref();
+        let context = DecisionContext { task, situation: &situation, candidates, previous, model: &self.model };
         let decision = planner.decide(&context)?;
         let kind = decision.to_task(&context)?;
         let (strip, t_pre, t_acq, priority) = match (decision, kind) {
