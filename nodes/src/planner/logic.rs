@@ -149,6 +149,19 @@ mod tests {
         }
     }
 
+    /// Waits as long as the last task's transition was.
+    struct Echo;
+
+    impl Planner for Echo {
+        fn name(&self) -> String {
+            "echo".to_owned()
+        }
+
+        fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+            Ok(Decision::Wait { ticks: context.previous.map_or(1, |previous| previous.t_pre) })
+        }
+    }
+
     fn env() -> Env {
         Env::episode(Arc::new(Model::new(SimConfig::default()).unwrap()), &EpisodeConfig::default(), 2)
     }
@@ -176,6 +189,18 @@ mod tests {
         assert_eq!(second.on_upcoming(upcoming(&env, 0)), None);
         assert_eq!(second.on_decision_point(0, situation, None), Some(planned));
         assert_eq!(second.on_decision_point(1, situation, None), None, "candidates of another task do not count");
+    }
+
+    #[test]
+    fn the_planner_is_told_how_the_last_task_went() {
+        let mut env = env();
+        let mut logic =
+            PlannerLogic::new((**env.model()).clone(), GuardedPlanner::new(Box::new(Echo)), gate(env.model()));
+        logic.on_decision_point(0, *env.context().situation, None);
+        assert_eq!(logic.on_upcoming(upcoming(&env, 0)).unwrap().decision, Decision::Wait { ticks: 1 });
+        let record = env.step(Decision::Image { candidate: 0, t_pre: 97 }).unwrap().record;
+        logic.on_decision_point(1, *env.context().situation, Some(record));
+        assert_eq!(logic.on_upcoming(upcoming(&env, 1)).unwrap().decision, Decision::Wait { ticks: 97 });
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use swath_sim::catalogue::{Candidate, Prepared};
 use swath_sim::flight::Situation;
 use swath_sim::orbit::Orbit;
-use swath_sim::planner::Search;
+use swath_sim::planner::{Allowance, Search};
 use swath_sim::strip::StripId;
 use swath_sim::time::Tick;
 use swath_sim::windows::Window;
@@ -184,12 +184,13 @@ impl RequestLogic {
         let longest = self.model.t_pre_max();
         let begin = Tick(candidate.window.open.0.saturating_sub(u64::from(longest)));
         if begin <= situation.now {
-            let found = Search::new(&self.model, situation, 0).shortest(situation, candidate, longest);
+            let found =
+                Search::new(&self.model, situation, &Allowance::default()).shortest(situation, candidate, longest);
             return found.map(|found| found.t_pre);
         }
         let period = self.model.period;
         let mut orbit = Orbit::through(&situation.r_BN_N, &situation.v_BN_N, situation.now, period);
         let then = Situation { now: begin, r_BN_N: orbit.position(begin), v_BN_N: orbit.velocity(begin), ..*situation };
-        Search::new(&self.model, &then, 0).settling(&then, candidate, longest, longest)
+        Search::new(&self.model, &then, &Allowance::default()).settling(&then, candidate, longest, longest)
     }
 }
