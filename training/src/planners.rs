@@ -9,7 +9,12 @@ use crate::lookahead::PolicyLookahead;
 use crate::policy::{LearnedPlanner, Policy};
 
 /// Policies that are part of the program.
-const SHIPPED: [(&str, &[u8]); 1] = [("hop-ppo", include_bytes!("../policies/hop_ppo.safetensors"))];
+const SHIPPED: [(&str, &[u8]); 4] = [
+    ("hop-ppo", include_bytes!("../policies/hop_ppo.safetensors")),
+    ("hop-ppo-mlp", include_bytes!("../policies/hop_ppo_mlp.safetensors")),
+    ("h-ppo", include_bytes!("../policies/h_ppo.safetensors")),
+    ("discrete-ppo", include_bytes!("../policies/discrete_ppo.safetensors")),
+];
 
 /// Makes the planner for a mission of this seed.
 ///
