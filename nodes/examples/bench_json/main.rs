@@ -16,7 +16,7 @@ const RUNS: usize = 5;
 /// How long a process may take to load its libraries.
 const LOADING: Duration = Duration::from_secs(4);
 /// Two orbits: long enough that starting up does not count.
-const MISSION: &str = "orbits = 2.0\n[requests.random]\ncount = [3000, 3000]\n";
+const MISSION: &str = "orbits = 2.0\nplanner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";
 
 fn main() -> Result<()> {
     let swath = swath()?;

@@ -55,7 +55,7 @@ pub struct UnknownPlanner {
 
 impl Default for PlannerSpec {
     fn default() -> Self {
-        Self::Lookahead(None)
+        Self::Beam(BeamSearch::default())
     }
 }
 
