@@ -251,6 +251,12 @@ fn bad_requests_are_refused_each_with_its_reason() {
 }
 
 #[test]
+fn calls_hold_one_to_a_hundred_thousand_entries() {
+    let code = |count| super::refusal::check_batch(count).map_err(|refusal| refusal.code());
+    assert_eq!((code(0), code(1), code(100_000), code(100_001)), (Err(112), Ok(()), Ok(()), Err(109)));
+}
+
+#[test]
 fn lists_go_by_state_area_and_time_page_by_page() {
     let mut logic = logic();
     let ids: Vec<_> = (0..30).map(|i| logic.submit(equatorial(&format!("{i}"), f64::from(i) * 5.0)).unwrap()).collect();
