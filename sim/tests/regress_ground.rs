@@ -12,7 +12,7 @@ use swath_sim::scenario::{InitialState, ScenarioConfig};
 use swath_sim::strip::StripRequest;
 use swath_sim::time::Tick;
 
-const SMALL: GroundSettings = GroundSettings { width: 2, branches: 5 };
+const SMALL: GroundSettings = GroundSettings { width: 2, branches: 5, weakness: 0.0 };
 
 fn model(candidates: usize) -> Arc<Model> {
     let mut config = SimConfig::default();
@@ -54,8 +54,8 @@ fn a_plan_flown_on_the_true_plant_brings_what_it_promises_and_beats_the_beam() {
 #[test]
 fn a_wider_beam_finds_a_better_plan() {
     let env = env(0.5, CANDIDATES, 3);
-    let narrow = plan(&env, &GroundSettings { width: 1, branches: 2 });
-    let wide = plan(&env, &GroundSettings { width: 6, branches: 6 });
+    let narrow = plan(&env, &GroundSettings { width: 1, branches: 2, ..SMALL });
+    let wide = plan(&env, &GroundSettings { width: 6, branches: 6, ..SMALL });
     assert!(wide.reward > narrow.reward && wide.ticks > narrow.ticks, "{} {}", wide.reward, narrow.reward);
 }
 
@@ -63,8 +63,11 @@ fn a_wider_beam_finds_a_better_plan() {
 fn a_plan_flown_blindly_keeps_its_times_and_loses_on_another_plant() {
     let mut env = env(1.0, CANDIDATES, 2);
     let plan = plan(&env, &SMALL);
+    let careful = self::plan(&env, &GroundSettings { weakness: 0.1, ..SMALL });
     env.differ(&"torque-10%".parse().unwrap(), 2).unwrap();
+    let (_, with_margin) = fly(env.clone(), &mut OpenLoop::new(&careful));
     let (records, totals) = fly(env, &mut OpenLoop::new(&plan));
+    assert!(careful.reward < plan.reward && with_margin.reward > totals.reward, "{with_margin:?} {totals:?}");
     let flown: Vec<_> = records.iter().filter(|record| record.strip.is_some()).collect();
     assert_eq!(flown.len(), plan.tasks.len());
     for (record, task) in flown.iter().zip(&plan.tasks) {

@@ -28,7 +28,8 @@ pub struct Bracket {
 }
 
 /// Plans every mission with its whole catalogue known, and flies the plan blindly on each plant. With requests that come
-/// in flight the plan that is flown knows only the others, while the brackets are for all of them.
+/// in flight the plan that is flown knows only the others, and it keeps the margin; the brackets are for all requests and
+/// without a margin.
 ///
 /// # Errors
 /// Settings out of range.
@@ -41,13 +42,13 @@ pub fn brackets(missions: &Missions, plants: &[PlantErrors], settings: &GroundSe
     let bracket = |seed: u64| {
         let all_known = EpisodeConfig { arrivals: 0.0, ..missions.episode.clone() };
         let env = Env::episode(model.clone(), &all_known, seed);
-        let best = plan(&env, settings);
+        let best = plan(&env, &GroundSettings { weakness: 0.0, ..*settings });
         let per_orbit = |reward: f64| reward / missions.episode.orbits;
         let upper_bound = per_orbit(upper_bound(&env));
-        let (env, to_fly) = if missions.episode.arrivals > 0.0 {
+        let (env, to_fly) = if missions.episode.arrivals > 0.0 || settings.weakness > 0.0 {
             let env = Env::episode(model.clone(), &missions.episode, seed);
-            let known = plan(&env, settings);
-            (env, known)
+            let careful = plan(&env, settings);
+            (env, careful)
         } else {
             (env, best.clone())
         };

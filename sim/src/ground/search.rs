@@ -21,11 +21,13 @@ pub struct GroundSettings {
     pub width: usize,
     /// Strips that each is continued with.
     pub branches: usize,
+    /// Margin against errors of the model: share of the wheels' torque limit that is not counted on.
+    pub weakness: f64,
 }
 
 impl Default for GroundSettings {
     fn default() -> Self {
-        Self { width: 4, branches: 8 }
+        Self { width: 4, branches: 8, weakness: 0.0 }
     }
 }
 
@@ -84,12 +86,13 @@ impl<'a> Ground<'a> {
     fn new(env: &'a Env, settings: &'a GroundSettings) -> Self {
         let model: &Model = env.model();
         let situation = env.context().situation;
+        let allowance = Allowance { weakness: settings.weakness, ..Allowance::default() };
         Self {
             env,
             settings,
             model,
             passes: Passes::new(env.catalogue()),
-            search: Search::new(model, situation, &Allowance::default()),
+            search: Search::new(model, situation, &allowance),
             orbit: Orbit::through(&situation.r_BN_N, &situation.v_BN_N, situation.now, model.period),
             earth: model.earth.clone(),
             bucket: u64::from(model.period.ticks_ceil(BUCKET_S)).max(1),

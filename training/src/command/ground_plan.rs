@@ -20,6 +20,9 @@ pub struct GroundPlanArgs {
     /// Strips that each of them is continued with
     #[arg(long, default_value_t = GroundSettings::default().branches as u64, value_parser = clap::value_parser!(u64).range(1..=100))]
     branches: u64,
+    /// Margin of the plans that are flown: share of the wheels' torque limit that they do not count on
+    #[arg(long, default_value_t = 0.0, value_parser = share)]
+    weakness: f64,
     #[command(flatten)]
     plants: PlantArgs,
     #[command(flatten)]
@@ -29,11 +32,19 @@ pub struct GroundPlanArgs {
     json: Option<PathBuf>,
 }
 
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=0.9).contains(&share) => Ok(share),
+        _ => Err(format!("{text} is not a share from 0 to 0.9")),
+    }
+}
+
 /// Runs `ground-plan`.
 pub fn ground_plan(args: &GroundPlanArgs) -> Result<()> {
     let plants = args.plants.named()?;
     let errors: Vec<_> = plants.iter().map(|(_, errors)| errors.clone()).collect();
-    let settings = GroundSettings { width: args.width as usize, branches: args.branches as usize };
+    let settings =
+        GroundSettings { width: args.width as usize, branches: args.branches as usize, weakness: args.weakness };
     let found = brackets(&args.missions.missions()?, &errors, &settings)?;
     let of = |quantity: fn(&Bracket) -> f64| spread_of(&found.iter().map(quantity).collect::<Vec<f64>>());
     let (known, bound) = (of(|it| it.best_known), of(|it| it.upper_bound));
@@ -61,7 +72,7 @@ pub fn ground_plan(args: &GroundPlanArgs) -> Result<()> {
         .map(|it| json!({ "seed": it.seed, "best_known": it.best_known, "upper_bound": it.upper_bound, "ticks": it.ticks }))
         .collect();
     let whole = json!({
-        "missions": args.missions.describe(), "width": args.width, "branches": args.branches,
+        "missions": args.missions.describe(), "width": args.width, "branches": args.branches, "weakness": args.weakness,
         "best_known": known, "upper_bound": bound, "brackets": each, "flown_blindly": flown,
     });
     args.json.as_deref().map_or(Ok(()), |path| write_json(path, &whole))
