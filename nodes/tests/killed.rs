@@ -74,6 +74,10 @@ fn kill_and_look(kills: u64) {
     let stop = std::sync::atomic::AtomicBool::new(false);
     let (submitted, acknowledged) = std::thread::scope(|scope| {
         let submitter = scope.spawn(|| submit_until(&stop, &domain));
+        common::until("the first task", || {
+            let tasks = std::fs::read_to_string(out.join("tasks.jsonl")).ok()?;
+            tasks.contains('\n').then_some(())
+        });
         for kill in 0..kills {
             std::thread::sleep(pause(kill));
             let pid = common::until("the request manager", || request_manager(&store));
