@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
 use swath_sim::env::EpisodeConfig;
 use swath_sim::observation::ObservationSet;
+use swath_sim::planner::PlannerSpec;
 
 use crate::error::{Result, TrainingError};
 use crate::network::NetworkConfig;
@@ -164,21 +165,21 @@ impl Default for PpoConfig {
     }
 }
 
-/// Behaviour cloning from the environment's teacher before PPO starts.
+/// Learning from a teacher before PPO starts: the actors imitate it, and the critic learns what its way is worth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WarmStartConfig {
-    /// Decisions shown.
+    /// Decisions shown, in batches as PPO's.
     pub decisions: u64,
-    /// Adam's step.
+    /// Adam's step at the beginning; it falls linearly to a tenth.
     pub learning_rate: f64,
-    /// For strips: the teacher is the heuristic with this transition time [s].
-    #[serde(default = "teacher_t_pre_s")]
-    pub teacher_t_pre_s: f64,
+    /// For strips: the planner that is imitated.
+    #[serde(default = "teacher")]
+    pub teacher: PlannerSpec,
 }
 
-fn teacher_t_pre_s() -> f64 {
-    90.0
+fn teacher() -> PlannerSpec {
+    PlannerSpec::Heuristic(90.0)
 }
 
 impl RunConfig {
@@ -208,7 +209,6 @@ impl RunConfig {
         if let Some(warm_start) = &self.warm_start {
             between("warm_start.decisions", warm_start.decisions as f64, 1.0, 1e9)?;
             between("warm_start.learning_rate", warm_start.learning_rate, 1e-9, 1.0)?;
-            between("warm_start.teacher_t_pre_s", warm_start.teacher_t_pre_s, 0.0, 1e4)?;
         }
         self.environment.validate()
     }

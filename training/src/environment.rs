@@ -77,8 +77,11 @@ pub trait Environment: Send {
     /// The longest transition [s]: what a parameter of 1 stands for.
     fn parameter_scale_s(&self) -> f64;
 
-    /// What the hand-written teacher would do now; `None` where there is none or it would wait.
-    fn teach(&mut self) -> Result<Option<Action>> {
-        Ok(None)
-    }
+    /// What the environment's teacher does next. Where it would wait, time moves on first, which counts to the duration
+    /// of the next step.
+    ///
+    /// # Errors
+    /// An environment without a teacher.
+    fn teach(&mut self) -> Result<Action>;
+
 }

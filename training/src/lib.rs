@@ -23,6 +23,5 @@ pub mod strips;
 pub mod tensorboard;
 pub mod toy;
 pub mod trainer;
-pub mod warm_start;
 
 pub use error::{Result, TrainingError};

@@ -25,8 +25,18 @@ pub struct Ppo {
     pub kl_coefficient: f64,
 }
 
+/// What a batch of experience is learned for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aim {
+    /// The policy gathered it: actions that turned out well become more probable.
+    Improve,
+    /// A teacher gathered it: its actions become more probable.
+    Imitate,
+}
+
 /// The loss that is made small.
 struct Objective<'a> {
+    aim: Aim,
     config: &'a PpoConfig,
     kl_coefficient: f64,
     network: &'a Network,
@@ -50,7 +60,7 @@ struct Batch {
 /// Means over an update.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct UpdateStatistics {
-    /// Clipped surrogate, to be made large.
+    /// Clipped surrogate, or log-likelihood of the teacher's actions, to be made large.
     pub surrogate: f64,
     /// Squared error of the critic.
     pub value_loss: f64,
@@ -80,7 +90,7 @@ impl Ppo {
         Ppo { adam: Adam::new(count, device), kl_coefficient, config }
     }
 
-    /// Improves the weights by several passes over a batch of experience.
+    /// Changes the weights by several passes over a batch of experience.
     ///
     /// # Errors
     /// A gradient that is not finite; `step` is named in the error.
@@ -89,6 +99,7 @@ impl Ppo {
         network: &Network,
         parameters: &mut Parameters,
         segments: &[Segment],
+        aim: Aim,
         learning_rate: f64,
         rng: &mut impl Rng,
         step: u64,
@@ -103,7 +114,7 @@ impl Ppo {
             order.shuffle(rng);
             let mut kl = 0.0;
             for minibatch in order.chunks(self.config.minibatch) {
-                let (gradient, shard_sums) = self.gradient(network, parameters, &batch, minibatch)?;
+                let (gradient, shard_sums) = self.gradient(network, parameters, &batch, aim, minibatch)?;
                 let length = gradient.norm().double_value(&[]);
                 if !length.is_finite() {
                     let quantity = "the gradient";
@@ -120,7 +131,7 @@ impl Ppo {
             }
             statistics.kl = kl / batch.len() as f64;
             statistics.epochs += 1.0;
-            if self.config.kl_stop.is_some_and(|limit| statistics.kl > limit) {
+            if aim == Aim::Improve && self.config.kl_stop.is_some_and(|limit| statistics.kl > limit) {
                 break;
             }
         }
@@ -131,7 +142,9 @@ impl Ppo {
         statistics.entropy = sums[4] / decisions;
         statistics.transition_entropy = sums[5] / decisions;
         statistics.gradient_norm = norm / minibatches;
-        self.adapt_kl(statistics.kl);
+        if aim == Aim::Improve {
+            self.adapt_kl(statistics.kl);
+        }
         Ok(statistics)
     }
 
@@ -142,10 +155,11 @@ impl Ppo {
         network: &Network,
         parameters: &Parameters,
         batch: &Batch,
+        aim: Aim,
         minibatch: &[i64],
     ) -> Result<(Tensor, [f64; SUMS])> {
         let shard = minibatch.len().div_ceil(self.config.shards);
-        let objective = Objective { config: &self.config, kl_coefficient: self.kl_coefficient, network };
+        let objective = Objective { aim, config: &self.config, kl_coefficient: self.kl_coefficient, network };
         let tasks: Vec<(Parameters, Batch)> =
             minibatch.chunks(shard).map(|rows| (parameters.share(), batch.rows(rows))).collect();
         let results: Vec<Result<(Tensor, [f64; SUMS])>> = tasks
@@ -188,18 +202,23 @@ impl Objective<'_> {
         let assessment = network.assess(parameters, &batch.observations);
         let logs = distribution::log_probabilities(&assessment.logits);
         let old = &batch.log_probabilities;
-        let choice_ratio = distribution::chosen(&logs, &batch.choice) - distribution::chosen(old, &batch.choice);
+        let choice_log = distribution::chosen(&logs, &batch.choice);
+        let choice_ratio = &choice_log - distribution::chosen(old, &batch.choice);
         let entropy = distribution::entropy(&logs);
         let mut kl = distribution::categorical_kl(old, &logs);
         let transition = network.transition(parameters, &batch.observations, &assessment, &batch.choice);
         let mut transition_entropy = entropy.zeros_like();
         let (surrogate, clipped) = match transition {
+            None if self.aim == Aim::Imitate => (choice_log, entropy.zeros_like()),
             None => self.surrogate(&choice_ratio, &batch.advantage),
             Some(gaussian) => {
-                let transition_ratio = gaussian.log_density(&batch.latent) - &batch.log_density;
+                let transition_log = gaussian.log_density(&batch.latent);
+                let transition_ratio = &transition_log - &batch.log_density;
                 kl += batch.gaussian.kl(&gaussian);
                 transition_entropy = gaussian.latent_entropy();
-                if network.has_separate_objectives() {
+                if self.aim == Aim::Imitate {
+                    (choice_log + transition_log, entropy.zeros_like())
+                } else if network.has_separate_objectives() {
                     let (a, clipped_a) = self.surrogate(&choice_ratio, &batch.advantage);
                     let (b, clipped_b) = self.surrogate(&transition_ratio, &batch.advantage);
                     (a + b, (clipped_a + clipped_b) * 0.5)
@@ -215,14 +234,17 @@ impl Objective<'_> {
         };
         let parts = [&surrogate, &error, &kl, &clipped, &entropy, &transition_entropy];
         let sums = Tensor::stack(&parts, 0).sum_dim_intlist(-1, false, Kind::Float);
-        let weights = [
-            -1.0,
-            config.value_coefficient,
-            self.kl_coefficient,
-            0.0,
-            -config.entropy_coefficient,
-            -config.transition_entropy_coefficient,
-        ];
+        let weights = match self.aim {
+            Aim::Imitate => [-1.0, config.value_coefficient, 0.0, 0.0, 0.0, 0.0],
+            Aim::Improve => [
+                -1.0,
+                config.value_coefficient,
+                self.kl_coefficient,
+                0.0,
+                -config.entropy_coefficient,
+                -config.transition_entropy_coefficient,
+            ],
+        };
         let weights = Tensor::from_slice(&weights).to_kind(Kind::Float).to_device(sums.device());
         ((&sums * weights).sum(Kind::Float), sums.detach())
     }

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tch::{Device, Tensor};
 
-use crate::distribution::{sample_choice, sample_latent, squash};
+use crate::distribution::{sample_choice, sample_latent, squash, unsquash};
 use crate::environment::{Action, Environment, ObservationShape, Progress};
 use crate::error::{Result, TrainingError};
 use crate::gae::{self, Next};
@@ -158,6 +158,14 @@ pub struct Segment {
     pub tally: Tally,
 }
 
+impl Segment {
+    /// The action of an entry.
+    fn action(&self, entry: usize, network: &Network) -> Action {
+        let (token, fixed) = network.decode(self.choice[entry] as usize);
+        Action { token, parameter: fixed.unwrap_or_else(|| squash(self.latent[entry])) }
+    }
+}
+
 /// Discount per second and λ of the advantage estimate.
 #[derive(Debug, Clone, Copy)]
 pub struct Discount {
@@ -165,6 +173,15 @@ pub struct Discount {
     pub gamma: f64,
     /// λ.
     pub lambda: f64,
+}
+
+/// Whose actions the environments carry out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lead {
+    /// The policy's, drawn from its distributions.
+    Policy,
+    /// The teacher's.
+    Teacher,
 }
 
 /// The policy as rollouts use it.
@@ -188,14 +205,14 @@ impl Group {
         &self.slots
     }
 
-    /// Steps every environment `steps` times with actions drawn from the policy.
-    pub fn collect(&mut self, actor: &Actor, steps: usize, discount: Discount) -> Result<Segment> {
+    /// Steps every environment `steps` times.
+    pub fn collect(&mut self, actor: &Actor, steps: usize, discount: Discount, lead: Lead) -> Result<Segment> {
         let _guard = tch::no_grad_guard();
         let mut segment = Segment::default();
         let mut decisions: Vec<Vec<gae::Decision>> = vec![Vec::with_capacity(steps); self.slots.len()];
         let mut last = Ends::default();
         for _ in 0..steps {
-            self.step_all(actor, &mut segment, &mut decisions, &mut last)?;
+            self.step_all(actor, lead, &mut segment, &mut decisions, &mut last)?;
         }
         for (index, slot) in self.slots.iter().enumerate() {
             if decisions[index].last().is_some_and(|it| it.next == Next::Decision) {
@@ -216,19 +233,21 @@ impl Group {
     fn step_all(
         &mut self,
         actor: &Actor,
+        lead: Lead,
         segment: &mut Segment,
         decisions: &mut [Vec<gae::Decision>],
         last: &mut Ends,
     ) -> Result<()> {
+        let taught = self.taught(lead)?;
         let (features, valid) = self.observe(segment)?;
         let seen = observations(features, valid, self.shape, actor.device);
         let first = segment.choice.len();
-        self.draw(actor, &seen, segment)?;
+        self.act(actor, taught.as_deref(), &seen, segment)?;
         for (index, slot) in self.slots.iter_mut().enumerate() {
             let entry = first + index;
-            let (token, fixed) = actor.network.decode(segment.choice[entry] as usize);
-            let parameter = fixed.unwrap_or_else(|| squash(segment.latent[entry]));
-            let outcome = slot.step(Action { token, parameter })?;
+            let action = taught.as_ref().map_or_else(|| segment.action(entry, actor.network), |taught| taught[index]);
+            let parameter = action.parameter;
+            let outcome = slot.step(action)?;
             segment.tally += Tally {
                 reward: outcome.reward,
                 duration_s: outcome.duration_s,
@@ -271,14 +290,33 @@ impl Group {
         Ok((&segment.features[first * numbers..], &segment.valid[first * tokens..]))
     }
 
-    /// Draws a choice and a latent for every environment.
-    fn draw(&mut self, actor: &Actor, seen: &Observations, segment: &mut Segment) -> Result<()> {
+    /// What the teachers do next, where they lead. Teachers may let time pass, so observations come after this.
+    fn taught(&mut self, lead: Lead) -> Result<Option<Vec<Action>>> {
+        match lead {
+            Lead::Policy => Ok(None),
+            Lead::Teacher => self.slots.iter_mut().map(|slot| slot.environment.teach()).collect::<Result<_>>().map(Some),
+        }
+    }
+
+    /// Appends a choice and a latent for every environment: those that were taught, or else drawn ones; and what the
+    /// policy says.
+    fn act(
+        &mut self,
+        actor: &Actor,
+        taught: Option<&[Action]>,
+        seen: &Observations,
+        segment: &mut Segment,
+    ) -> Result<()> {
         let assessment = actor.network.assess(&actor.parameters, seen);
         let choices = actor.network.choices();
         let logits = finite(to_vec(&assessment.logits)?, "choice")?;
         let first = segment.choice.len();
-        for (slot, row) in self.slots.iter_mut().zip(logits.chunks(choices)) {
-            segment.choice.push(sample_choice(row, &mut slot.rng) as i64);
+        for (index, (slot, row)) in self.slots.iter_mut().zip(logits.chunks(choices)).enumerate() {
+            let choice = taught.map_or_else(
+                || sample_choice(row, &mut slot.rng),
+                |taught| actor.network.encode(taught[index].token, taught[index].parameter),
+            );
+            segment.choice.push(choice as i64);
         }
         segment.logits.extend(logits);
         segment.value.extend(finite(to_vec(&assessment.value)?, "value")?);
@@ -291,8 +329,11 @@ impl Group {
         };
         let means = finite(to_vec(&gaussian.mean)?, "transition")?;
         let deviations = finite(to_vec(&gaussian.log_deviation)?, "transition")?;
-        for (slot, (mean, deviation)) in self.slots.iter_mut().zip(means.iter().zip(&deviations)) {
-            segment.latent.push(sample_latent(*mean, *deviation, &mut slot.rng));
+        for (index, (slot, (mean, deviation))) in self.slots.iter_mut().zip(means.iter().zip(&deviations)).enumerate() {
+            segment.latent.push(taught.map_or_else(
+                || sample_latent(*mean, *deviation, &mut slot.rng),
+                |taught| unsquash(taught[index].parameter),
+            ));
             segment.gaussian.extend([mean, deviation]);
         }
         Ok(())

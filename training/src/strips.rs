@@ -5,14 +5,18 @@ use std::sync::Arc;
 use swath_sim::env::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::observation::ObservationSet;
-use swath_sim::planner::{Decision, Heuristic, Planner};
+use swath_sim::planner::{Decision, Planner, PlannerSpec};
 
 use crate::config::StripsConfig;
 use crate::environment::{Action, Environment, ObservationShape, Outcome, Progress};
 use crate::error::{Result, TrainingError};
+use crate::planners;
 
 /// How long to wait when no strip is left to choose from [s].
 pub(crate) const WAIT_S: f64 = 60.0;
+
+/// Longest time that a teacher may wait before a strip [s].
+const LONGEST_LESSON_WAIT_S: f64 = 86_400.0;
 
 /// Strip imaging, one task a step.
 pub struct Strips {
@@ -20,11 +24,19 @@ pub struct Strips {
     episode: EpisodeConfig,
     set: ObservationSet,
     env: Option<Env>,
-    teacher: Heuristic,
+    teacher: Option<Teacher>,
+}
+
+/// A planner that the policy may learn from.
+struct Teacher {
+    spec: PlannerSpec,
+    planner: Box<dyn Planner + Send>,
+    /// Time that it has waited since the last step [s].
+    waited_s: f64,
 }
 
 impl Strips {
-    /// Strip imaging as a run configures it; the teacher waits 90 s before every strip.
+    /// Strip imaging as a run configures it.
     ///
     /// # Errors
     /// A setting of the simulation that is out of range.
@@ -35,14 +47,17 @@ impl Strips {
             episode: config.episode.clone(),
             set: config.observation,
             env: None,
-            teacher: Heuristic { t_pre_s: 90.0 },
+            teacher: None,
         })
     }
 
-    /// The same with a teacher of another fixed transition time [s].
-    pub fn with_teacher(mut self, t_pre_s: f64) -> Strips {
-        self.teacher = Heuristic { t_pre_s };
-        self
+    /// The same with a teacher.
+    ///
+    /// # Errors
+    /// A planner that cannot be made.
+    pub fn with_teacher(mut self, spec: PlannerSpec) -> Result<Strips> {
+        self.teacher = Some(Teacher { planner: planners::make(&spec, 0)?, spec, waited_s: 0.0 });
+        Ok(self)
     }
 
     fn env(&self) -> Result<&Env> {
@@ -71,6 +86,10 @@ impl Environment for Strips {
     }
 
     fn reset(&mut self, seed: u64) -> Result<()> {
+        if let Some(teacher) = &mut self.teacher {
+            // A planner may remember what it flew.
+            *teacher = Teacher { planner: planners::make(&teacher.spec, seed)?, spec: teacher.spec.clone(), waited_s: 0.0 };
+        }
         self.env = Some(Env::episode(self.model.clone(), &self.episode, seed));
         self.wait_for_candidates()?;
         Ok(())
@@ -85,7 +104,7 @@ impl Environment for Strips {
         let decision = decision(&self.model, action);
         let env = self.env.as_mut().ok_or_else(no_episode)?;
         let step = env.step(decision).map_err(failed)?;
-        let waited_s = self.wait_for_candidates()?;
+        let waited_s = self.wait_for_candidates()? + self.teacher.as_mut().map_or(0.0, Teacher::take_waited_s);
         Ok(Outcome {
             reward: step.record.reward,
             duration_s: self.model.period.duration_s(step.record.ticks()) + waited_s,
@@ -103,15 +122,30 @@ impl Environment for Strips {
         self.model.config.planning.t_pre_max_s
     }
 
-    fn teach(&mut self) -> Result<Option<Action>> {
-        let env = self.env.as_ref().ok_or_else(no_episode)?;
+    fn teach(&mut self) -> Result<Action> {
+        let teacher = self.teacher.as_mut().ok_or_else(|| failed("there is no teacher to learn from"))?;
         let longest_s = self.model.config.planning.t_pre_max_s;
-        Ok(match self.teacher.decide(&env.context()).map_err(failed)? {
-            Decision::Wait { .. } => None,
-            Decision::Image { candidate, t_pre } => {
-                Some(Action { token: candidate, parameter: self.model.period.duration_s(t_pre) / longest_s })
+        loop {
+            let env = self.env.as_mut().ok_or_else(no_episode)?;
+            match teacher.planner.decide(&env.context()).map_err(failed)? {
+                Decision::Wait { .. } if teacher.waited_s > LONGEST_LESSON_WAIT_S => {
+                    return Err(failed(format!("the teacher {} has waited for a day", teacher.spec)));
+                }
+                Decision::Wait { ticks } => {
+                    env.step(Decision::Wait { ticks }).map_err(failed)?;
+                    teacher.waited_s += self.model.period.duration_s(ticks);
+                }
+                Decision::Image { candidate, t_pre } => {
+                    return Ok(Action { token: candidate, parameter: self.model.period.duration_s(t_pre) / longest_s });
+                }
             }
-        })
+        }
+    }
+}
+
+impl Teacher {
+    fn take_waited_s(&mut self) -> f64 {
+        std::mem::take(&mut self.waited_s)
     }
 }
 

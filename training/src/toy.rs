@@ -131,13 +131,14 @@ impl Environment for Toy {
         LONGEST_S
     }
 
-    fn teach(&mut self) -> Result<Option<Action>> {
+    fn teach(&mut self) -> Result<Action> {
         // Greedy: the greatest worth per second.
         let rate = |token: usize| {
             let (worth, duration_s) = self.prospect(token);
             worth / duration_s
         };
         let token = (0..self.valid).max_by(|&a, &b| rate(a).total_cmp(&rate(b)));
-        Ok(token.map(|token| Action { token, parameter: f64::from(self.need[token]) }))
+        let token = token.unwrap_or(0);
+        Ok(Action { token, parameter: f64::from(self.need[token]) })
     }
 }

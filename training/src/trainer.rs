@@ -7,21 +7,22 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tch::Device;
 
+use crate::adam::Adam;
 use crate::checkpoint;
 use crate::config::{EnvironmentConfig, RunConfig};
 use crate::environment::Environment;
 use crate::error::{Result, TrainingError};
 use crate::network::Network;
 use crate::parameters::{Layout, Parameters};
-use crate::ppo::{Ppo, UpdateStatistics};
-use crate::rollout::{Actor, Discount, Group, Segment, Slot, SlotState, Tally};
+use crate::ppo::{Aim, Ppo, UpdateStatistics};
+use crate::rollout::{Actor, Discount, Group, Lead, Segment, Slot, SlotState, Tally};
 use crate::strips::Strips;
 use crate::toy::Toy;
-use crate::warm_start;
 
-/// Random streams of one seed: weights and shuffling here, one for each environment after these.
+/// Random streams of one seed: weights and shuffling, one for each environment, one for each that a teacher leads.
 const STREAM_LEARNER: u64 = 0;
 const STREAM_ENVIRONMENTS: u64 = 1;
+const STREAM_LESSONS: u64 = 1 << 32;
 
 /// Everything that a run consists of at one moment.
 pub struct Trainer {
@@ -92,13 +93,8 @@ impl Trainer {
         rng.set_stream(STREAM_LEARNER);
         let parameters = Parameters::initial(&layout, &mut rng, device)?;
         let ppo = Ppo::new(run.ppo.clone(), layout.count(), device);
-        let streams = 0..run.rollout.environments as u64;
-        let slots: Vec<Slot> = streams
-            .into_par_iter()
-            .map(|index| Slot::new(environment(&run)?, run.seed, STREAM_ENVIRONMENTS + index, run.rollout.stagger))
-            .collect::<Result<_>>()?;
         Ok(Trainer {
-            groups: grouped(slots, &run, &network),
+            groups: groups(&run, &network, STREAM_ENVIRONMENTS, || environment(&run))?,
             reporting_period_s: first.reporting_period_s(),
             parameter_scale_s: first.parameter_scale_s(),
             run,
@@ -162,24 +158,34 @@ impl Trainer {
         Ok(())
     }
 
-    /// Clones the teacher's behaviour if the run asks for it; see [`warm_start::clone_teacher`].
-    pub fn warm_start(&mut self) -> Result<Option<f64>> {
-        let Some(config) = &self.run.warm_start else {
-            return Ok(None);
+    /// Learns from the teacher, if the run has one, before PPO begins: `each` is given every batch's report, whose
+    /// `surrogate` is the mean log-likelihood of the teacher's actions. Environments of their own are used, so what PPO
+    /// experiences afterwards does not depend on how long this took.
+    ///
+    /// # Errors
+    /// As [`Trainer::advance`]; a teacher that cannot be made.
+    pub fn warm_start(&mut self, mut each: impl FnMut(&Report)) -> Result<()> {
+        let Some(config) = self.run.warm_start.clone() else {
+            return Ok(());
         };
-        let environment: Box<dyn Environment> = match &self.run.environment {
-            EnvironmentConfig::Toy(toy) => Box::new(Toy::new(toy.tokens)),
-            EnvironmentConfig::Strips(strips) => Box::new(Strips::new(strips)?.with_teacher(config.teacher_t_pre_s)),
-        };
-        let likelihood = warm_start::clone_teacher(
-            &self.run,
-            &self.network,
-            &mut self.parameters,
-            environment,
-            config.decisions,
-            config.learning_rate,
-        )?;
-        Ok(Some(likelihood))
+        let mut groups = groups(&self.run, &self.network, STREAM_LESSONS, || {
+            Ok(match &self.run.environment {
+                EnvironmentConfig::Toy(toy) => Box::new(Toy::new(toy.tokens)),
+                EnvironmentConfig::Strips(strips) => {
+                    Box::new(Strips::new(strips)?.with_teacher(config.teacher.clone())?)
+                }
+            })
+        })?;
+        let mut shown = 0;
+        while shown < config.decisions {
+            let segments = self.collect(&mut groups, Lead::Teacher)?;
+            let learning_rate = config.learning_rate * (1.0 - 0.9 * shown as f64 / config.decisions as f64);
+            let update = self.update(&segments, Aim::Imitate, learning_rate)?;
+            shown += segments.iter().map(|it| it.choice.len() as u64).sum::<u64>();
+            each(&Report { steps: shown, ..self.report(&segments, learning_rate, update) });
+        }
+        self.ppo.adam = Adam::new(self.layout.count(), self.parameters.flat.device());
+        Ok(())
     }
 
     /// What must be saved to go on later.
@@ -243,22 +249,33 @@ impl Trainer {
 
     /// Learns from one batch.
     pub fn learn(&mut self, segments: &[Segment]) -> Result<UpdateStatistics> {
-        let learning_rate = self.learning_rate();
-        self.ppo.update(&self.network, &mut self.parameters, segments, learning_rate, &mut self.rng, self.steps)
+        self.update(segments, Aim::Improve, self.learning_rate())
+    }
+
+    fn update(&mut self, segments: &[Segment], aim: Aim, learning_rate: f64) -> Result<UpdateStatistics> {
+        let (network, parameters) = (&self.network, &mut self.parameters);
+        self.ppo.update(network, parameters, segments, aim, learning_rate, &mut self.rng, self.steps)
     }
 
     /// Steps all environments for one batch.
     pub fn gather(&mut self) -> Result<Vec<Segment>> {
+        let mut groups = std::mem::take(&mut self.groups);
+        let segments = self.collect(&mut groups, Lead::Policy);
+        self.groups = groups;
+        segments
+    }
+
+    fn collect(&self, groups: &mut [Group], lead: Lead) -> Result<Vec<Segment>> {
         let steps = self.run.steps_per_environment();
         let discount = Discount { gamma: self.run.ppo.gamma, lambda: self.run.ppo.lambda };
         let device = self.parameters.flat.device();
         let network = &self.network;
         let actors: Vec<Actor> =
-            self.groups.iter().map(|_| Actor { network, parameters: self.parameters.share(), device }).collect();
-        self.groups
+            groups.iter().map(|_| Actor { network, parameters: self.parameters.share(), device }).collect();
+        groups
             .par_iter_mut()
             .zip(actors)
-            .map(|(group, actor)| group.collect(&actor, steps, discount))
+            .map(|(group, actor)| group.collect(&actor, steps, discount, lead))
             .collect::<Result<_>>()
             .map_err(|error| match error {
                 TrainingError::PolicyNotFinite { quantity } => TrainingError::NotFinite { quantity, step: self.steps },
@@ -326,6 +343,19 @@ fn build(run: &RunConfig) -> Result<(Network, Layout, Box<dyn Environment>)> {
     let first = environment(run)?;
     let (network, layout) = Network::new(&run.network, first.shape(), first.parameter_scale_s())?;
     Ok((network, layout, first))
+}
+
+/// Fresh environments in groups, with a random stream each.
+fn groups(
+    run: &RunConfig,
+    network: &Network,
+    first_stream: u64,
+    environment: impl Fn() -> Result<Box<dyn Environment>> + Sync,
+) -> Result<Vec<Group>> {
+    let streams = first_stream..first_stream + run.rollout.environments as u64;
+    let slot = |stream| Slot::new(environment()?, run.seed, stream, run.rollout.stagger);
+    let slots = streams.into_par_iter().map(slot).collect::<Result<_>>()?;
+    Ok(grouped(slots, run, network))
 }
 
 fn grouped(slots: Vec<Slot>, run: &RunConfig, network: &Network) -> Vec<Group> {

@@ -108,13 +108,13 @@ fn behaviour_cloning_makes_the_policy_do_what_the_teacher_does() {
     let warm_start = "warm_start = { decisions = 40000, learning_rate = 3e-3 }";
     let mut trainer = Trainer::new(run(network, warm_start), Device::Cpu).unwrap();
     let fresh = weights(trainer.layout(), &trainer);
-    trainer.warm_start().unwrap().unwrap();
+    trainer.warm_start(|_| {}).unwrap();
     let cloned = weights(trainer.layout(), &trainer);
     let mut agreement = [0, 0];
     let mut toy = Toy::new(TOKENS);
     for seed in 0..500 {
         toy.reset(seed).unwrap();
-        let wanted = toy.teach().unwrap().unwrap();
+        let wanted = toy.teach().unwrap();
         for (count, parameters) in agreement.iter_mut().zip([&fresh, &cloned]) {
             let action = greedy(trainer.network(), parameters, &toy);
             let near = (action.parameter - wanted.parameter).abs() < 0.1;

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use swath_msgs::{builtin_interfaces::Time, rosgraph_msgs::Clock};
-use swath_ros::{Cdr, Publisher, RawPublisher, qos::SEND_TIMEOUT, stamp};
+use swath_ros::{Cdr, Publisher, RawPublisher, stamp};
 
 use super::{lateness::Lateness, pace::Pace};
 use crate::{
@@ -16,33 +16,6 @@ struct Pending {
     topic: usize,
     log_time: u64,
     cdr: Cdr,
-}
-
-/// Samples of a topic that may be on their way at a time when nothing sets a pace: some 300 fill a
-/// socket of Linux's default size.
-const WINDOW: usize = 128;
-
-/// Publishes a topic of the bag.
-pub(super) struct TopicPublisher {
-    pub publisher: RawPublisher,
-    /// Samples that the publisher can send again.
-    pub depth: usize,
-    /// Samples sent since all were last known to be acknowledged.
-    pub unacknowledged: usize,
-}
-
-impl TopicPublisher {
-    /// Waits for the readers before more is on its way than a socket holds, or samples that they may
-    /// not have are overwritten.
-    ///
-    /// Without pace messages would be read from the bag faster than any reader takes them.
-    fn make_room(&mut self) {
-        if self.unacknowledged >= self.depth.div_ceil(2).min(WINDOW) {
-            self.publisher.flush(SEND_TIMEOUT);
-            self.unacknowledged = 0;
-        }
-        self.unacknowledged += 1;
-    }
 }
 
 /// Publishes simulated time while it plays.
@@ -61,7 +34,7 @@ pub(super) struct Engine<'a> {
     messages: Messages<'a>,
     pending: Option<Pending>,
     /// By topic of the bag.
-    publishers: Vec<Option<TopicPublisher>>,
+    publishers: Vec<Option<RawPublisher>>,
     clock: Option<ClockPublisher>,
     pub pace: Pace,
     pub published: u64,
@@ -74,7 +47,7 @@ impl<'a> Engine<'a> {
     pub(super) fn new(
         bag: &'a Bag,
         filter: Filter,
-        publishers: Vec<Option<TopicPublisher>>,
+        publishers: Vec<Option<RawPublisher>>,
         clock: Option<ClockPublisher>,
         pace: Pace,
     ) -> Result<Self> {
@@ -149,11 +122,8 @@ impl<'a> Engine<'a> {
     }
 
     fn publish(&mut self, topic: usize, cdr: Cdr) {
-        let Some(topic) = &mut self.publishers[topic] else { return };
-        if self.pace.rate() == 0.0 {
-            topic.make_room();
-        }
-        match topic.publisher.publish(cdr) {
+        let Some(publisher) = &self.publishers[topic] else { return };
+        match publisher.publish(cdr) {
             Ok(()) => self.published += 1,
             Err(error) => {
                 // One warning is enough; the count is in the summary.
@@ -203,8 +173,8 @@ impl<'a> Engine<'a> {
     /// Waits until reliable readers have everything.
     pub(super) fn flush(&self, timeout: Duration) {
         let deadline = Instant::now() + timeout;
-        for topic in self.publishers.iter().flatten() {
-            topic.publisher.flush(deadline.saturating_duration_since(Instant::now()));
+        for publisher in self.publishers.iter().flatten() {
+            publisher.flush(deadline.saturating_duration_since(Instant::now()));
         }
     }
 

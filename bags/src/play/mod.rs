@@ -12,11 +12,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use swath_ros::{Node, RosArgs, Shutdown, graph};
+use swath_ros::{RawPublisher, Node, RosArgs, Shutdown, graph};
 
 use self::{
     control::{Control, follow_key},
-    engine::{ClockPublisher, Engine, TopicPublisher},
+    engine::{ClockPublisher, Engine},
     keys::Keys,
     pace::Pace,
 };
@@ -35,6 +35,8 @@ const CHORES: Duration = Duration::from_millis(20);
 const TURN: usize = 256;
 /// Least number of samples that a publisher of a topic that is not latched can send again.
 const LEAST_DEPTH: u64 = 1024;
+/// Samples of a topic that may be under way, unacknowledged: some 300 fill a socket of Linux's default size.
+const WINDOW: usize = 128;
 /// How long readers may take to acknowledge the last messages [wall time].
 const LAST_MESSAGES: Duration = Duration::from_secs(5);
 /// How long the publishers stay after that: RustDDS drops what a reader has not yet taken when its
@@ -202,7 +204,7 @@ impl Player {
     }
 
     /// A publisher for each topic that is played.
-    fn publishers(&self, bag: &Bag) -> Result<Vec<Option<TopicPublisher>>> {
+    fn publishers(&self, bag: &Bag) -> Result<Vec<Option<RawPublisher>>> {
         let known: BTreeSet<&str> = bag.topics().iter().map(|t| t.topic.name.as_str()).collect();
         if let Some(unknown) = self.options.qos_overrides.keys().find(|name| !known.contains(name.as_str())) {
             let reason = format!("the bag has no topic {unknown}");
@@ -211,7 +213,7 @@ impl Player {
         bag.topics().iter().map(|topic| self.publisher(topic)).collect()
     }
 
-    fn publisher(&self, topic: &BagTopic) -> Result<Option<TopicPublisher>> {
+    fn publisher(&self, topic: &BagTopic) -> Result<Option<RawPublisher>> {
         let name = &topic.topic.name;
         let own_clock = self.options.clock_hz.is_some() && name == CLOCK;
         if !self.options.topics.selects(name) || own_clock {
@@ -230,11 +232,9 @@ impl Player {
             qos = change.apply(qos);
         }
         let renamed = self.options.remap.get(name).unwrap_or(name);
-        match self.node.raw_publisher(renamed, &topic.topic.type_name, &to_ros(&qos)) {
-            Ok(publisher) => {
-                let depth = qos.depth.max(1) as usize;
-                Ok(Some(TopicPublisher { publisher, depth, unacknowledged: 0 }))
-            }
+        let window = (qos.depth.max(1) as usize).min(WINDOW);
+        match self.node.raw_publisher_with_window(renamed, &topic.topic.type_name, &to_ros(&qos), window) {
+            Ok(publisher) => Ok(Some(publisher)),
             Err(error) => {
                 tracing::warn!("{name} is not played: {}", chain(&error));
                 Ok(None)

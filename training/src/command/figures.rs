@@ -14,9 +14,9 @@ pub struct FiguresArgs {
     /// A learning curve of Fig. 3: LABEL=progress.jsonl; curves of one label are averaged
     #[arg(long = "curve", value_name = "LABEL=FILE", value_parser = labelled)]
     curves: Vec<(String, PathBuf)>,
-    /// JSON of `swath-train evaluate` for Fig. 4
-    #[arg(long, value_name = "FILE")]
-    evaluation: Option<PathBuf>,
+    /// A figure like Fig. 4, rewards by planner: its name and the JSON of `swath-train evaluate`
+    #[arg(long = "evaluation", value_name = "NAME=FILE", value_parser = labelled)]
+    evaluations: Vec<(String, PathBuf)>,
     /// JSON of `swath-train evaluate --requests N` for Fig. 5, one for each density
     #[arg(long = "density", value_name = "FILE")]
     densities: Vec<PathBuf>,
@@ -60,7 +60,7 @@ struct Mean {
 }
 
 fn labelled(text: &str) -> Result<(String, PathBuf), String> {
-    let (label, file) = text.split_once('=').ok_or("give LABEL=FILE")?;
+    let (label, file) = text.split_once('=').ok_or("give NAME=FILE")?;
     Ok((label.to_owned(), file.into()))
 }
 
@@ -70,9 +70,9 @@ pub fn figures(args: &FiguresArgs) -> Result<()> {
     if !args.curves.is_empty() {
         figures::learning_curves(&args.out.join("fig3"), &curves(&args.curves)?)?;
     }
-    if let Some(path) = &args.evaluation {
+    for (name, path) in &args.evaluations {
         let boxes: Vec<Box> = evaluation(path)?.planners.iter().map(boxed).collect();
-        figures::boxes(&args.out.join("fig4"), &boxes)?;
+        figures::boxes(&args.out.join(name), &boxes)?;
     }
     if !args.densities.is_empty() {
         figures::densities(&args.out.join("fig5"), &density_bars(&args.densities)?)?;

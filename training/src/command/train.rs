@@ -108,9 +108,12 @@ impl Folder {
         fs::write(self.path.join("run.toml"), text)
             .with_context(|| format!("cannot write to {}", self.path.display()))?;
         fs::write(self.progress(), "").with_context(|| format!("cannot write {}", self.progress().display()))?;
-        if let Some(likelihood) = trainer.warm_start()? {
-            eprintln!("warm start: log-likelihood of the teacher's actions {likelihood:.3}");
-        }
+        trainer.warm_start(|report| {
+            eprintln!(
+                "warm start: {} decisions shown, log-likelihood {:.3}, critic explains {:.2}",
+                report.steps, report.update.surrogate, report.update.explained_variance
+            );
+        })?;
         Ok(trainer)
     }
 
