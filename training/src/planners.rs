@@ -33,6 +33,19 @@ pub fn make(spec: &PlannerSpec, seed: u64) -> Result<Box<dyn Planner + Send>> {
     planner.ok_or_else(|| TrainingError::Environment(format!("{spec} cannot be made")))
 }
 
+/// SHA-256 of the policy that a planner would decide with, in hexadecimal; `None` for a hand-written planner.
+///
+/// # Errors
+/// As [`make`].
+pub fn digest(spec: &PlannerSpec) -> Result<Option<String>> {
+    match spec {
+        PlannerSpec::Learned { kind, file, .. } => {
+            Ok(Some(policy(kind, file.as_deref())?.digest().to_owned()))
+        }
+        _ => Ok(None),
+    }
+}
+
 fn policy(kind: &str, file: Option<&Path>) -> Result<Policy> {
     let (policy, path) = match file {
         Some(path) => (Policy::load(path)?, path.to_owned()),

@@ -74,6 +74,9 @@ pub struct RecordArgs {
     /// TOML or JSON file that tells of the mission; its text and entries go into the bag as metadata
     #[arg(long, value_name = "FILE")]
     manifest: Option<PathBuf>,
+    /// More entries of that metadata
+    #[arg(long, value_name = "KEY=VALUE", value_parser = pair, requires = "manifest")]
+    manifest_data: Vec<(String, String)>,
     /// Node whose topics must be matched before the recorder is ready; may be repeated
     #[arg(long, value_name = "NODE")]
     expect: Vec<String>,
@@ -104,7 +107,11 @@ impl RecordArgs {
 
     fn options(self) -> Result<RecordOptions> {
         let metadata = match &self.manifest {
-            Some(path) => vec![(MANIFEST.to_owned(), manifest(path)?)],
+            Some(path) => {
+                let mut entries = manifest(path)?;
+                entries.extend(self.manifest_data);
+                vec![(MANIFEST.to_owned(), entries)]
+            }
             None => Vec::new(),
         };
         let topics: Vec<String> = self.topics.iter().map(|t| format!("/{}", t.trim_start_matches('/'))).collect();

@@ -10,6 +10,7 @@ use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph};
 use swath_sim::env::Totals;
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_training::checkpoint::REVISION;
 
 use super::fleet::Fleet;
 use super::output::OutputFolder;
@@ -33,7 +34,8 @@ pub fn fly(mission: &Mission, mission_file: &Path, output: &mut OutputFolder, re
     if record {
         let bag = output.path().join("bag");
         let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
-        fleet.start(graph::RECORDER, "swath-bag", &words.map(str::to_owned), true)?;
+        let words: Vec<String> = words.map(str::to_owned).into_iter().chain(manifest_data(mission)).collect();
+        fleet.start(graph::RECORDER, "swath-bag", &words, true)?;
         fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
     }
     start_nodes(&mut fleet, mission_file, output, record)?;
@@ -56,6 +58,18 @@ pub fn fly(mission: &Mission, mission_file: &Path, output: &mut OutputFolder, re
         nodes,
     };
     Ok(Summary::new(inputs, &flown.totals, model.period))
+}
+
+/// What the manifest of the bag tells besides the mission.
+fn manifest_data(mission: &Mission) -> Vec<String> {
+    let mut entries = vec![format!("revision={REVISION}")];
+    match swath_training::planners::digest(&mission.planner) {
+        Ok(Some(digest)) => entries.push(format!("policy_hash={digest}")),
+        Ok(None) => {}
+        // The planner node raises the alarm and the heuristic takes over.
+        Err(error) => entries.push(format!("policy_hash=none: {error}")),
+    }
+    entries.into_iter().flat_map(|entry| ["--manifest-data".to_owned(), entry]).collect()
 }
 
 fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, record: bool) -> Result<()> {
