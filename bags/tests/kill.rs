@@ -1,6 +1,6 @@
-//! A killed writer loses no more than the last second.
+//! A killed writer, or recorder, loses no more than the last second.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test that cannot go on should panic")]
 
 mod common;
 
@@ -11,13 +11,18 @@ use std::{
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     thread::sleep,
-    time::{Duration, SystemTime, UNIX_EPOCH},
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
+use common::{
+    program::{Program, node, wait_until},
+    state,
+};
 use swath_bags::{
     Bag, BagOptions, BagWriter, Topic,
     ops::{recover::recover, validate::validate},
 };
+use swath_ros::graph;
 
 /// Where the child writes its bag; without it the child's part is no test.
 const BAG: &str = "SWATH_TEST_KILLED_BAG";
@@ -68,11 +73,45 @@ fn a_killed_writer_loses_no_more_than_the_last_second() {
         child.wait().unwrap();
         let bytes = fs::read(heartbeat(&path("killed", n))).unwrap();
         let killed_at = u64::from_le_bytes(bytes.try_into().unwrap());
-        let saved = path("saved", n);
-        recover(&path("killed", n), &saved, BagOptions::default()).unwrap();
-        assert_eq!(validate(&saved, None).unwrap().faults, [""; 0], "kill {n}");
-        let (_, last) = Bag::open(&saved).unwrap().time_range().unwrap();
-        let lost = killed_at.saturating_sub(last);
-        assert!(lost < 1_000_000_000, "kill {n} lost the last {lost} ns");
+        assert_lost_within_a_second(&path("killed", n), &path("saved", n), killed_at);
     }
+}
+
+/// Recovers a killed bag; it is whole up to a second before the kill [ns since 1970].
+fn assert_lost_within_a_second(killed: &Path, saved: &Path, killed_at: u64) {
+    recover(killed, saved, BagOptions::default()).unwrap();
+    let killed = killed.display();
+    assert_eq!(validate(saved, None).unwrap().faults, [""; 0], "{killed}");
+    let (_, last) = Bag::open(saved).unwrap().time_range().unwrap();
+    let lost = killed_at.saturating_sub(last);
+    assert!(lost < 1_000_000_000, "{killed} lost the last {lost} ns");
+}
+
+#[test]
+#[ignore = "takes minutes: cargo test --release -p swath-bags --test kill -- --ignored --nocapture"]
+fn a_killed_recorder_loses_no_more_than_the_last_second() {
+    const DOMAIN: u16 = 48;
+    let temp = tempfile::tempdir().unwrap();
+    for kill in 0..KILLS {
+        // A node each time: one whose reader was killed waits for it until its lease is over.
+        let node = node(DOMAIN);
+        let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
+        let name = format!("killed {kill}");
+        let words = ["record", "-o", &name, "--wall-time", "/swath/spacecraft/state"];
+        let recorder = Program::start(DOMAIN, temp.path(), &words);
+        wait_until("the recorder listens", || states.matched() > 0);
+        // 137 ms apart, the kills strike at every phase of the writer's half-second rhythm.
+        let until = Instant::now() + Duration::from_millis(1000 + kill * 137 % 1000);
+        for tick in 0.. {
+            states.publish(&state(tick)).unwrap();
+            if Instant::now() > until {
+                break;
+            }
+            sleep(Duration::from_millis(5));
+        }
+        let killed_at = now_ns();
+        recorder.kill();
+        assert_lost_within_a_second(&temp.path().join(name), &temp.path().join(format!("saved {kill}")), killed_at);
+    }
+    println!("{KILLS} kills of the recorder, none lost more than the last second");
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use swath_msgs::{builtin_interfaces::Time, rosgraph_msgs::Clock};
-use swath_ros::{Cdr, Publisher, RawPublisher, stamp};
+use swath_ros::{Cdr, Publisher, RawPublisher, qos::SEND_TIMEOUT, stamp};
 
 use super::{lateness::Lateness, pace::Pace};
 use crate::{
@@ -17,6 +17,9 @@ struct Pending {
     log_time: u64,
     cdr: Cdr,
 }
+
+/// Message bytes that may be under way at a time when nothing sets a pace.
+const UNDER_WAY_BYTES: usize = 16 << 20;
 
 /// Publishes simulated time while it plays.
 pub(super) struct ClockPublisher {
@@ -35,6 +38,8 @@ pub(super) struct Engine<'a> {
     pending: Option<Pending>,
     /// By topic of the bag.
     publishers: Vec<Option<RawPublisher>>,
+    /// Bytes published since all were last known to be acknowledged.
+    under_way: usize,
     clock: Option<ClockPublisher>,
     pub pace: Pace,
     pub published: u64,
@@ -58,6 +63,7 @@ impl<'a> Engine<'a> {
             messages,
             pending: None,
             publishers,
+            under_way: 0,
             clock,
             pace,
             published: 0,
@@ -122,6 +128,9 @@ impl<'a> Engine<'a> {
     }
 
     fn publish(&mut self, topic: usize, cdr: Cdr) {
+        if self.pace.rate() == 0.0 {
+            self.make_room(cdr.as_bytes().len());
+        }
         let Some(publisher) = &self.publishers[topic] else { return };
         match publisher.publish(cdr) {
             Ok(()) => self.published += 1,
@@ -132,6 +141,16 @@ impl<'a> Engine<'a> {
                 }
                 self.refused += 1;
             }
+        }
+    }
+
+    /// Waits until readers have what they were sent before it takes much memory: without pace, messages are read from
+    /// the bag faster than any reader takes them.
+    fn make_room(&mut self, bytes: usize) {
+        self.under_way += bytes;
+        if self.under_way > UNDER_WAY_BYTES {
+            self.flush(SEND_TIMEOUT);
+            self.under_way = bytes;
         }
     }
 

@@ -78,6 +78,12 @@ impl Program {
         (self.child.wait().unwrap(), last)
     }
 
+    /// Ends it as SIGKILL does.
+    pub fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
     /// Interrupts it as Ctrl-C does, and waits for the end.
     pub fn interrupt(self) -> (ExitStatus, Value) {
         let pid = self.child.id().to_string();
