@@ -83,5 +83,4 @@ pub trait Environment: Send {
     /// # Errors
     /// An environment without a teacher.
     fn teach(&mut self) -> Result<Action>;
-
 }

@@ -39,9 +39,7 @@ pub fn make(spec: &PlannerSpec, seed: u64) -> Result<Box<dyn Planner + Send>> {
 /// As [`make`].
 pub fn digest(spec: &PlannerSpec) -> Result<Option<String>> {
     match spec {
-        PlannerSpec::Learned { kind, file, .. } => {
-            Ok(Some(policy(kind, file.as_deref())?.digest().to_owned()))
-        }
+        PlannerSpec::Learned { kind, file, .. } => Ok(Some(policy(kind, file.as_deref())?.digest().to_owned())),
         _ => Ok(None),
     }
 }

@@ -34,6 +34,17 @@ pub enum Aim {
     Imitate,
 }
 
+/// One batch to learn from.
+#[derive(Debug, Clone, Copy)]
+pub struct Lesson<'a> {
+    /// Experience.
+    pub segments: &'a [Segment],
+    /// What for.
+    pub aim: Aim,
+    /// Adam's step.
+    pub learning_rate: f64,
+}
+
 /// The loss that is made small.
 struct Objective<'a> {
     aim: Aim,
@@ -98,12 +109,11 @@ impl Ppo {
         &mut self,
         network: &Network,
         parameters: &mut Parameters,
-        segments: &[Segment],
-        aim: Aim,
-        learning_rate: f64,
+        lesson: Lesson<'_>,
         rng: &mut impl Rng,
         step: u64,
     ) -> Result<UpdateStatistics> {
+        let Lesson { segments, aim, learning_rate } = lesson;
         let device = parameters.flat.device();
         let batch = Batch::new(network, segments, device)?;
         let mut order: Vec<i64> = (0..batch.len() as i64).collect();

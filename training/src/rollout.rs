@@ -294,7 +294,9 @@ impl Group {
     fn taught(&mut self, lead: Lead) -> Result<Option<Vec<Action>>> {
         match lead {
             Lead::Policy => Ok(None),
-            Lead::Teacher => self.slots.iter_mut().map(|slot| slot.environment.teach()).collect::<Result<_>>().map(Some),
+            Lead::Teacher => {
+                self.slots.iter_mut().map(|slot| slot.environment.teach()).collect::<Result<_>>().map(Some)
+            }
         }
     }
 

@@ -88,7 +88,8 @@ impl Environment for Strips {
     fn reset(&mut self, seed: u64) -> Result<()> {
         if let Some(teacher) = &mut self.teacher {
             // A planner may remember what it flew.
-            *teacher = Teacher { planner: planners::make(&teacher.spec, seed)?, spec: teacher.spec.clone(), waited_s: 0.0 };
+            *teacher =
+                Teacher { planner: planners::make(&teacher.spec, seed)?, spec: teacher.spec.clone(), waited_s: 0.0 };
         }
         self.env = Some(Env::episode(self.model.clone(), &self.episode, seed));
         self.wait_for_candidates()?;

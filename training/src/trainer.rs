@@ -14,7 +14,7 @@ use crate::environment::Environment;
 use crate::error::{Result, TrainingError};
 use crate::network::Network;
 use crate::parameters::{Layout, Parameters};
-use crate::ppo::{Aim, Ppo, UpdateStatistics};
+use crate::ppo::{Aim, Lesson, Ppo, UpdateStatistics};
 use crate::rollout::{Actor, Discount, Group, Lead, Segment, Slot, SlotState, Tally};
 use crate::strips::Strips;
 use crate::toy::Toy;
@@ -254,7 +254,8 @@ impl Trainer {
 
     fn update(&mut self, segments: &[Segment], aim: Aim, learning_rate: f64) -> Result<UpdateStatistics> {
         let (network, parameters) = (&self.network, &mut self.parameters);
-        self.ppo.update(network, parameters, segments, aim, learning_rate, &mut self.rng, self.steps)
+        let lesson = Lesson { segments, aim, learning_rate };
+        self.ppo.update(network, parameters, lesson, &mut self.rng, self.steps)
     }
 
     /// Steps all environments for one batch.

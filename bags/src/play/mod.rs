@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use swath_ros::{RawPublisher, Node, RosArgs, Shutdown, graph};
+use swath_ros::{Node, RawPublisher, RosArgs, Shutdown, graph};
 
 use self::{
     control::{Control, follow_key},
