@@ -145,7 +145,7 @@ impl<'a> Engine<'a> {
     }
 
     /// Waits until readers have what they were sent before it takes much memory: without pace, messages are read from
-    /// the bag faster than any reader takes them.
+    /// the bag faster than any reader takes them. RustDDS bounds their number, and keeps each until it is acknowledged.
     fn make_room(&mut self, bytes: usize) {
         self.under_way += bytes;
         if self.under_way > UNDER_WAY_BYTES {

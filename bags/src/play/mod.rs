@@ -33,9 +33,8 @@ const CLOCK: &str = "/clock";
 const CHORES: Duration = Duration::from_millis(20);
 /// Messages that are played at a time when nothing has to be waited for.
 const TURN: usize = 256;
-/// Least number of samples that a publisher of a topic that is not latched can send again. The more may be under way
-/// unacknowledged, the more of them share a datagram and an acknowledgement.
-const LEAST_DEPTH: u64 = 4096;
+/// Least number of samples that a publisher of a topic that is not latched can send again.
+const LEAST_DEPTH: u64 = 1024;
 /// How long readers may take to acknowledge the last messages [wall time].
 const LAST_MESSAGES: Duration = Duration::from_secs(5);
 /// How long the publishers stay after that: RustDDS drops what a reader has not yet taken when its
@@ -231,8 +230,7 @@ impl Player {
             qos = change.apply(qos);
         }
         let renamed = self.options.remap.get(name).unwrap_or(name);
-        let window = usize::try_from(qos.depth.max(1)).unwrap_or(usize::MAX);
-        match self.node.raw_publisher_with_window(renamed, &topic.topic.type_name, &to_ros(&qos), window) {
+        match self.node.raw_publisher(renamed, &topic.topic.type_name, &to_ros(&qos)) {
             Ok(publisher) => Ok(Some(publisher)),
             Err(error) => {
                 tracing::warn!("{name} is not played: {}", chain(&error));

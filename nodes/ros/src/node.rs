@@ -22,7 +22,7 @@ use crate::logging;
 use crate::names::{Names, dds_service, dds_topic, dds_type};
 use crate::param_services::ParameterServices;
 use crate::params::{Parameters, Spec};
-use crate::qos::{Profile, QosProfile, policies, with_depth, with_window};
+use crate::qos::{Profile, QosProfile, policies, with_depth};
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
 use crate::signal::{Signal, lock};
@@ -78,7 +78,7 @@ impl Node {
         let qos = Profile::Latched.qos();
         let own = Gid::from(dds.participant.guid());
         let dds_type = dds_type(ANNOUNCEMENT_TYPE)?;
-        let announcer = dds.writer(ANNOUNCEMENTS, &dds_type, policies(&qos))?;
+        let announcer = dds.writer(ANNOUNCEMENTS, &dds_type, &qos)?;
         let roster = Arc::new(Roster::new(own, names.clone(), announcer));
         let announcements = RawSubscription::new(
             dds.reader(ANNOUNCEMENTS, &dds_type, &with_depth(qos, 256))?,
@@ -164,19 +164,7 @@ impl Node {
     /// `type_name` (such as `std_msgs/msg/Header`).
     pub fn raw_publisher(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawPublisher, RosError> {
         let topic = self.names.resolve(name)?;
-        self.writer(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, policies(qos))
-    }
-
-    /// As [`Node::raw_publisher`]; a send waits while `window` samples are not yet acknowledged by every reliable reader.
-    pub fn raw_publisher_with_window(
-        &self,
-        name: &str,
-        type_name: &str,
-        qos: &QosProfile,
-        window: usize,
-    ) -> Result<RawPublisher, RosError> {
-        let topic = self.names.resolve(name)?;
-        self.writer(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, with_window(policies(qos), window))
+        self.writer(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
     }
 
     /// A reader of CDR bytes from the topic `name` (relative, absolute or private) of the type
@@ -194,7 +182,7 @@ impl Node {
         let request_type = dds_type(S::Request::TYPE_NAME)?;
         let response_type = dds_type(S::Response::TYPE_NAME)?;
         let requests = self.reader(name.clone(), &request_topic, &request_type, &qos)?;
-        let responses = self.writer(name, &response_topic, &response_type, policies(&qos))?;
+        let responses = self.writer(name, &response_topic, &response_type, &qos)?;
         Ok(Server::new(requests, responses, self.environment.mapping))
     }
 
@@ -205,7 +193,7 @@ impl Node {
         let qos = Profile::Service.qos();
         let request_type = dds_type(S::Request::TYPE_NAME)?;
         let response_type = dds_type(S::Response::TYPE_NAME)?;
-        let requests = self.writer(name.clone(), &request_topic, &request_type, policies(&qos))?;
+        let requests = self.writer(name.clone(), &request_topic, &request_type, &qos)?;
         let responses = self.reader(name.clone(), &response_topic, &response_type, &qos)?;
         Ok(Client::new(name, requests, responses, self.environment.mapping))
     }
@@ -215,9 +203,9 @@ impl Node {
         topic: String,
         dds_topic: &str,
         dds_type: &str,
-        policies: QosPolicies,
+        qos: &QosProfile,
     ) -> Result<RawPublisher, RosError> {
-        let writer = self.dds.writer(dds_topic, dds_type, policies)?;
+        let writer = self.dds.writer(dds_topic, dds_type, qos)?;
         self.roster.enrol(Direction::Write, writer.guid().into());
         Ok(RawPublisher { writer, topic, roster: Arc::clone(&self.roster) })
     }
@@ -367,9 +355,10 @@ impl Dds {
         &self,
         topic: &str,
         type_name: &str,
-        policies: QosPolicies,
+        qos: &QosProfile,
     ) -> Result<rustdds::no_key::DataWriter<Cdr, Adapter>, RosError> {
         let what = format!("a writer of {topic}");
+        let policies = policies(qos);
         let topic = self.topic(topic, type_name, &policies)?;
         self.publisher.create_datawriter_no_key(&topic, Some(policies)).map_err(|error| create_error(&what, &error))
     }

@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 pub use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
-use rustdds::policy::ResourceLimits;
-use rustdds::{QosPolicies, QosPolicyBuilder};
+use rustdds::QosPolicies;
 
 /// A quality-of-service profile of the node graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -80,13 +79,6 @@ pub(crate) fn with_depth(qos: QosProfile, depth: usize) -> QosProfile {
 
 pub(crate) fn policies(qos: &QosProfile) -> QosPolicies {
     QosPolicies::from(qos)
-}
-
-/// The policies of a writer that has at most `window` samples under way.
-pub(crate) fn with_window(policies: QosPolicies, window: usize) -> QosPolicies {
-    let max_samples = i32::try_from(window).unwrap_or(i32::MAX);
-    let limits = ResourceLimits { max_samples, max_instances: -1, max_samples_per_instance: max_samples };
-    policies.modify_by(&QosPolicyBuilder::new().resource_limits(limits).build())
 }
 
 #[cfg(test)]
