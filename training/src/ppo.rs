@@ -218,23 +218,25 @@ impl Objective<'_> {
         let mut kl = distribution::categorical_kl(old, &logs);
         let transition = network.transition(parameters, &batch.observations, &assessment, &batch.choice);
         let mut transition_entropy = entropy.zeros_like();
-        let (surrogate, clipped) = match transition {
-            None if self.aim == Aim::Imitate => (choice_log, entropy.zeros_like()),
-            None => self.surrogate(&choice_ratio, &batch.advantage),
-            Some(gaussian) => {
-                let transition_log = gaussian.log_density(&batch.latent);
-                let transition_ratio = &transition_log - &batch.log_density;
-                kl += batch.gaussian.kl(&gaussian);
-                transition_entropy = gaussian.latent_entropy();
-                if self.aim == Aim::Imitate {
-                    (choice_log + transition_log, entropy.zeros_like())
-                } else if network.has_separate_objectives() {
-                    let (a, clipped_a) = self.surrogate(&choice_ratio, &batch.advantage);
-                    let (b, clipped_b) = self.surrogate(&transition_ratio, &batch.advantage);
-                    (a + b, (clipped_a + clipped_b) * 0.5)
-                } else {
-                    self.surrogate(&(choice_ratio + transition_ratio), &batch.advantage)
-                }
+        let transition_log = transition.map(|gaussian| {
+            kl += batch.gaussian.kl(&gaussian);
+            transition_entropy = gaussian.latent_entropy();
+            gaussian.log_density(&batch.latent)
+        });
+        let transition_ratio = transition_log.as_ref().map(|log| log - &batch.log_density);
+        let (surrogate, clipped) = match (self.aim, transition_ratio) {
+            (Aim::Imitate, _) => {
+                let likelihood = transition_log.map_or_else(|| choice_log.shallow_clone(), |log| &choice_log + log);
+                (likelihood, entropy.zeros_like())
+            }
+            (Aim::Improve, None) => self.surrogate(&choice_ratio, &batch.advantage),
+            (Aim::Improve, Some(transition_ratio)) if network.has_separate_objectives() => {
+                let (a, clipped_a) = self.surrogate(&choice_ratio, &batch.advantage);
+                let (b, clipped_b) = self.surrogate(&transition_ratio, &batch.advantage);
+                (a + b, (clipped_a + clipped_b) * 0.5)
+            }
+            (Aim::Improve, Some(transition_ratio)) => {
+                self.surrogate(&(choice_ratio + transition_ratio), &batch.advantage)
             }
         };
         let error = (&assessment.value - &batch.value).square();

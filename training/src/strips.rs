@@ -56,7 +56,7 @@ impl Strips {
     /// # Errors
     /// A planner that cannot be made.
     pub fn with_teacher(mut self, spec: PlannerSpec) -> Result<Strips> {
-        self.teacher = Some(Teacher { planner: planners::make(&spec, 0)?, spec, waited_s: 0.0 });
+        self.teacher = Some(Teacher::new(spec, 0)?);
         Ok(self)
     }
 
@@ -88,8 +88,7 @@ impl Environment for Strips {
     fn reset(&mut self, seed: u64) -> Result<()> {
         if let Some(teacher) = &mut self.teacher {
             // A planner may remember what it flew.
-            *teacher =
-                Teacher { planner: planners::make(&teacher.spec, seed)?, spec: teacher.spec.clone(), waited_s: 0.0 };
+            *teacher = Teacher::new(teacher.spec.clone(), seed)?;
         }
         self.env = Some(Env::episode(self.model.clone(), &self.episode, seed));
         self.wait_for_candidates()?;
@@ -105,7 +104,8 @@ impl Environment for Strips {
         let decision = decision(&self.model, action);
         let env = self.env.as_mut().ok_or_else(no_episode)?;
         let step = env.step(decision).map_err(failed)?;
-        let waited_s = self.wait_for_candidates()? + self.teacher.as_mut().map_or(0.0, Teacher::take_waited_s);
+        let waited_s = self.wait_for_candidates()?
+            + self.teacher.as_mut().map_or(0.0, |teacher| std::mem::take(&mut teacher.waited_s));
         Ok(Outcome {
             reward: step.record.reward,
             duration_s: self.model.period.duration_s(step.record.ticks()) + waited_s,
@@ -145,8 +145,8 @@ impl Environment for Strips {
 }
 
 impl Teacher {
-    fn take_waited_s(&mut self) -> f64 {
-        std::mem::take(&mut self.waited_s)
+    fn new(spec: PlannerSpec, seed: u64) -> Result<Teacher> {
+        Ok(Teacher { planner: planners::make(&spec, seed)?, spec, waited_s: 0.0 })
     }
 }
 
@@ -162,4 +162,77 @@ fn failed(error: impl ToString) -> TrainingError {
 
 fn no_episode() -> TrainingError {
     failed("no episode has begun")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    /// Few strips, so that a teacher has to wait now and then.
+    fn config() -> StripsConfig {
+        let mut config = StripsConfig::default();
+        config.episode.orbits = 1.0;
+        config.episode.scenario.count = [150, 150];
+        config
+    }
+
+    #[test]
+    fn what_is_taught_is_what_the_teacher_flies() {
+        let (config, seed) = (config(), 3);
+        let mut strips = Strips::new(&config).unwrap().with_teacher(PlannerSpec::Heuristic(90.0)).unwrap();
+        strips.reset(seed).unwrap();
+        let started = strips.env().unwrap().now();
+        let (mut taught, mut seconds) = (Vec::new(), 0.0);
+        loop {
+            let action = strips.teach().unwrap();
+            assert_abs_diff_eq!(action.parameter, 90.0 / 120.0);
+            let outcome = strips.step(action).unwrap();
+            taught.push((outcome.reward, outcome.success));
+            seconds += outcome.duration_s;
+            if outcome.progress != Progress::Continues {
+                break;
+            }
+        }
+        let period = strips.model.period;
+        assert_abs_diff_eq!(
+            seconds,
+            period.time_s(strips.env().unwrap().now()) - period.time_s(started),
+            epsilon = 1e-6
+        );
+
+        let mut env = Env::episode(strips.model.clone(), &config.episode, seed);
+        let mut planner = planners::make(&PlannerSpec::Heuristic(90.0), seed).unwrap();
+        let (mut flown, mut waits) = (Vec::new(), 0);
+        while !env.truncated() {
+            let decision = planner.decide(&env.context()).unwrap();
+            let record = env.step(decision).unwrap().record;
+            match decision {
+                Decision::Image { .. } => flown.push((record.reward, record.success())),
+                Decision::Wait { .. } => waits += 1,
+            }
+        }
+        assert!(waits > 0 && flown.len() > 10, "{waits} {}", flown.len());
+        assert_eq!(taught[..flown.len()], flown);
+    }
+
+    #[test]
+    fn exact_transitions_survive_being_taught() {
+        let mut strips = Strips::new(&config()).unwrap().with_teacher(PlannerSpec::Lookahead(Some(0))).unwrap();
+        strips.reset(5).unwrap();
+        for _ in 0..20 {
+            let action = strips.teach().unwrap();
+            let ticks = action.parameter * f64::from(strips.model.t_pre_max());
+            let Decision::Image { t_pre, .. } = decision(&strips.model, action) else { panic!("it images") };
+            assert_abs_diff_eq!(f64::from(t_pre), ticks, epsilon = 1e-6);
+            assert!(strips.step(action).unwrap().success);
+        }
+    }
+
+    #[test]
+    fn nothing_is_taught_without_a_teacher() {
+        let mut strips = Strips::new(&config()).unwrap();
+        strips.reset(1).unwrap();
+        assert!(strips.teach().unwrap_err().to_string().contains("there is no teacher"));
+    }
 }

@@ -108,7 +108,12 @@ fn behaviour_cloning_makes_the_policy_do_what_the_teacher_does() {
     let warm_start = "warm_start = { decisions = 40000, learning_rate = 3e-3 }";
     let mut trainer = Trainer::new(run(network, warm_start), Device::Cpu).unwrap();
     let fresh = weights(trainer.layout(), &trainer);
-    trainer.warm_start(|_| {}).unwrap();
+    let mut reports = Vec::new();
+    trainer.warm_start(|report| reports.push((report.steps, report.update))).unwrap();
+    let ((_, first), (shown, last)) = (reports[0], reports[reports.len() - 1]);
+    assert_eq!((reports.len(), shown), (40, 40_960), "40 000 decisions in batches of 1024");
+    assert!(last.surrogate > first.surrogate + 1.0, "likelihood {} to {}", first.surrogate, last.surrogate);
+    assert!(last.explained_variance > first.explained_variance + 0.1, "{first:?} {last:?}");
     let cloned = weights(trainer.layout(), &trainer);
     let mut agreement = [0, 0];
     let mut toy = Toy::new(TOKENS);
