@@ -73,8 +73,9 @@ fn plant(name: &str) -> Result<PlantErrors> {
 /// Options of `swath-train evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// A planner: random, lookahead, heuristic:T, hop-ppo:FILE, hop-ppo-mlp:FILE, h-ppo:FILE or
-    /// discrete-ppo:FILE; may be given several times, the first is what others are compared with
+    /// A planner: random, heuristic:T, lookahead, beam, hop-ppo, hop-ppo-mlp, h-ppo, discrete-ppo or
+    /// hop-ppo+lookahead, each policy also with :FILE; may be given several times, the first is what others are
+    /// compared with
     #[arg(long = "planner", required = true)]
     planners: Vec<PlannerSpec>,
     #[command(flatten)]
