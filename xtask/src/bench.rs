@@ -1,7 +1,6 @@
-//! Measurements: every crate's `bench_json` example, merged into one JSON object on stdout.
+//! Measurements: every example whose name begins with `bench_`, merged into one JSON object on stdout.
 //!
-//! A crate takes part by having an example named `bench_json` that prints one JSON object of
-//! numbers and nothing else on stdout.
+//! Such an example prints one JSON object of numbers and nothing else on stdout.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,40 +15,40 @@ use crate::process;
 pub fn run(root: &Path) -> Result<()> {
     process::run(process::cargo(root, "build").args(["--quiet", "--release", "--workspace", "--bins"]))?;
     let mut all = Map::new();
-    for package in packages_with_bench(root)? {
+    for (package, example) in benches(root)? {
         eprintln!("measuring {package}");
         let mut cargo = process::cargo(root, "run");
-        cargo.args(["--quiet", "--release", "--package", &package]);
-        cargo.args(["--example", "bench_json"]);
+        cargo.args(["--quiet", "--release", "--package", &package, "--example", &example]);
         let measured = output(&mut cargo)?;
         let object = serde_json::from_slice(&measured)
-            .with_context(|| format!("bench_json of {package} did not print one JSON object"))?;
+            .with_context(|| format!("{example} of {package} did not print one JSON object"))?;
         merge(&mut all, object)?;
     }
     let text = serde_json::to_string_pretty(&all).context("cannot print the measurements")?;
     writeln!(std::io::stdout(), "{text}").context("cannot print the measurements")
 }
 
-fn packages_with_bench(root: &Path) -> Result<Vec<String>> {
+/// Every example whose name begins with `bench_`, as package and example.
+fn benches(root: &Path) -> Result<Vec<(String, String)>> {
     let mut cargo = process::cargo(root, "metadata");
     cargo.args(["--no-deps", "--format-version", "1"]);
     let metadata: Value = serde_json::from_slice(&output(&mut cargo)?).context("cargo metadata did not print JSON")?;
     let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
-    let mut names: Vec<String> = packages
-        .iter()
-        .filter(|package| has_bench(package))
-        .filter_map(|package| package["name"].as_str().map(str::to_owned))
-        .collect();
-    names.sort();
-    Ok(names)
+    let mut found = Vec::new();
+    for package in packages {
+        for target in package["targets"].as_array().into_iter().flatten().filter(|target| is_bench(target)) {
+            if let (Some(package), Some(example)) = (package["name"].as_str(), target["name"].as_str()) {
+                found.push((package.to_owned(), example.to_owned()));
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
 }
 
-fn has_bench(package: &Value) -> bool {
-    let targets = package["targets"].as_array();
-    targets.into_iter().flatten().any(|target| {
-        target["name"] == "bench_json"
-            && target["kind"].as_array().is_some_and(|kinds| kinds.contains(&"example".into()))
-    })
+fn is_bench(target: &Value) -> bool {
+    let is_example = target["kind"].as_array().is_some_and(|kinds| kinds.contains(&"example".into()));
+    is_example && target["name"].as_str().is_some_and(|name| name.starts_with("bench_"))
 }
 
 fn output(command: &mut Command) -> Result<Vec<u8>> {

@@ -388,23 +388,25 @@ mod tests {
 
     const MESSAGES: u64 = 400;
 
-    fn record(dir: &Path, disk: OpenDisk) -> Result<BagSummary> {
+    /// Lost before they reached the writer.
+    const LOST_BEFORE: u64 = 3;
+
+    /// Records until the writer refuses; returns how many messages it accepted.
+    fn record(dir: &Path, disk: OpenDisk) -> (u64, Result<BagSummary>) {
         let options = BagOptions {
             compression: Compression::None,
             chunk_bytes: 1000,
             max_file_bytes: Some(15_000),
             ..BagOptions::default()
         };
-        let bag = BagWriter::create_on(dir, options, disk)?;
+        let bag = BagWriter::create_on(dir, options, disk).unwrap();
         let qos = vec![QosProfile::reliable(1)];
-        let topic = bag.add_topic(&Topic::new("/x", "a/msg/B", "uint64 x\n", "", qos)?)?;
+        let topic = Topic::new("/x", "a/msg/B", "uint64 x\n", "", qos).unwrap();
+        let topic = bag.add_topic(&topic).unwrap();
+        bag.count_lost(topic, LOST_BEFORE);
         let payload = [0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8];
-        for n in 0..MESSAGES {
-            if bag.write(topic, n, n, &payload).is_err() {
-                bag.count_lost(topic, 1);
-            }
-        }
-        bag.close()
+        let accepted = (0..MESSAGES).take_while(|&n| bag.write(topic, n, n, &payload).is_ok()).count();
+        (accepted as u64, bag.close())
     }
 
     fn readable_messages(dir: &Path) -> u64 {
@@ -423,15 +425,17 @@ mod tests {
     fn a_full_disk_leaves_a_readable_bag_wherever_it_strikes() {
         let temp = tempfile::tempdir().unwrap();
         let whole = temp.path().join("whole");
-        let size = record(&whole, Box::new(open_file)).unwrap().bytes;
+        let size = record(&whole, Box::new(open_file)).1.unwrap().bytes;
         assert_eq!(readable_messages(&whole), MESSAGES);
         // Below this, not even an empty bag fits.
         for room in (2500..size + 200).step_by(97) {
             let dir = temp.path().join(room.to_string());
-            match record(&dir, small_disk(room)) {
-                Ok(summary) => assert_eq!((summary.messages, summary.lost), (MESSAGES, 0)),
-                Err(BagError::DiskFull { kept, .. }) => {
+            let (accepted, ended) = record(&dir, small_disk(room));
+            match ended {
+                Ok(summary) => assert_eq!((summary.messages, summary.lost), (MESSAGES, LOST_BEFORE)),
+                Err(BagError::DiskFull { kept, lost, .. }) => {
                     assert_eq!(readable_messages(&dir), kept, "room for {room} bytes");
+                    assert_eq!(kept + lost, accepted, "room for {room} bytes");
                     assert!(kept < MESSAGES);
                 }
                 Err(error) => panic!("room for {room} bytes: {error}"),
@@ -443,12 +447,12 @@ mod tests {
     fn what_is_lost_is_told() {
         let temp = tempfile::tempdir().unwrap();
         let dir = temp.path().join("small");
-        let Err(BagError::DiskFull { kept, lost, .. }) = record(&dir, small_disk(8000)) else {
+        let (accepted, Err(BagError::DiskFull { kept, lost, .. })) = record(&dir, small_disk(8000)) else {
             panic!("the disk should be full")
         };
         let bag = Bag::open(&dir).unwrap();
         let told = bag.losses();
         assert_eq!(told.unsaved, lost);
-        assert_eq!(kept + told.total(), MESSAGES);
+        assert_eq!(kept + told.total(), accepted + LOST_BEFORE);
     }
 }

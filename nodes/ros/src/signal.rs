@@ -54,7 +54,7 @@ impl Signal {
     /// So take from each subscription until it has nothing, then wait.
     ///
     /// The thread sleeps at once: with six busy threads on two cores, looking again and again
-    /// before sleeping made the loop of `examples/bench_json.rs` no faster and cost half as much
+    /// before sleeping made the loop of `examples/bench_ros.rs` no faster and cost half as much
     /// processor time again.
     pub fn wait(&self, timeout: Duration) -> bool {
         if self.lower() {

@@ -1,7 +1,7 @@
 //! Measures writing, reading, recording and playing; prints one JSON object.
 //!
-//! Recording takes two further processes: `bench_json record DIR` and `bench_json publish RATE N`;
-//! playing, alone with `bench_json play`, takes `bench_json play BAG RATE` and `bench_json listen N`.
+//! Recording takes two further processes: `bench_bags record DIR` and `bench_bags publish RATE N`;
+//! playing, alone with `bench_bags play`, takes `bench_bags play BAG RATE` and `bench_bags listen N`.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
 
 use std::{
@@ -50,7 +50,7 @@ fn main() {
         ["publish", rate, n] => publish(rate.parse().unwrap(), n.parse().unwrap()),
         ["play", bag, rate] => play(Path::new(bag), rate.parse().unwrap()),
         ["listen", n] => listen(n.parse().unwrap()),
-        _ => panic!("usage: bench_json [record DIR | publish RATE N | play [BAG RATE] | listen N]"),
+        _ => panic!("usage: bench_bags [record DIR | publish RATE N | play [BAG RATE] | listen N]"),
     };
     println!("{result}");
 }
