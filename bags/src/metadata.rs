@@ -108,7 +108,7 @@ impl BagInformation {
     /// [`BagError::Metadata`] when the YAML writer fails.
     pub fn to_yaml(&self, path: &Path) -> Result<String> {
         let document = Document { rosbag2_bagfile_information: self.clone() };
-        serde_yaml_ng::to_string(&document)
+        yaml_serde::to_string(&document)
             .map_err(|e| BagError::Metadata { path: path.to_owned(), reason: e.to_string() })
     }
 
@@ -123,7 +123,7 @@ impl BagInformation {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(BagError::io("read", &path)(e)),
         };
-        let document: Document = serde_yaml_ng::from_str(&text)
+        let document: Document = yaml_serde::from_str(&text)
             .map_err(|e| BagError::Metadata { path: path.clone(), reason: e.to_string() })?;
         let information = document.rosbag2_bagfile_information;
         if information.version != VERSION {

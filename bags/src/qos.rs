@@ -178,7 +178,7 @@ pub fn to_yaml(profiles: &[QosProfile]) -> Result<String> {
     if profiles.is_empty() {
         return Ok(String::new());
     }
-    serde_yaml_ng::to_string(profiles).map_err(|e| BagError::Qos { reason: e.to_string() })
+    yaml_serde::to_string(profiles).map_err(|e| BagError::Qos { reason: e.to_string() })
 }
 
 /// Parses what [`to_yaml`] writes; an empty text is an empty list.
@@ -189,7 +189,7 @@ pub fn from_yaml(text: &str) -> Result<Vec<QosProfile>> {
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
-    serde_yaml_ng::from_str(text).map_err(|e| BagError::Qos { reason: e.to_string() })
+    yaml_serde::from_str(text).map_err(|e| BagError::Qos { reason: e.to_string() })
 }
 
 #[cfg(test)]
@@ -222,10 +222,10 @@ mod tests {
 
     #[test]
     fn an_override_changes_what_it_names() {
-        let change: QosOverride = serde_yaml_ng::from_str("reliability: best_effort\ndepth: 3\n").unwrap();
+        let change: QosOverride = yaml_serde::from_str("reliability: best_effort\ndepth: 3\n").unwrap();
         let expected = QosProfile { reliability: Reliability::BestEffort, depth: 3, ..QosProfile::latched(1) };
         assert_eq!(change.apply(QosProfile::latched(1)), expected);
-        assert!(serde_yaml_ng::from_str::<QosOverride>("reliabilty: best_effort").is_err());
+        assert!(yaml_serde::from_str::<QosOverride>("reliabilty: best_effort").is_err());
     }
 
     #[test]

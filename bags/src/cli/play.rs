@@ -142,7 +142,7 @@ fn renaming(text: &str) -> Result<(String, String), String> {
 
 fn overrides(path: &Path) -> Result<BTreeMap<String, QosOverride>> {
     let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
-    serde_yaml_ng::from_str(&text).map_err(|e| BagError::Option {
+    yaml_serde::from_str(&text).map_err(|e| BagError::Option {
         option: "--qos-profile-overrides-path",
         reason: format!("{}: {e}", path.display()),
     })
