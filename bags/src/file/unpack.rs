@@ -31,11 +31,14 @@ impl Unpacker {
         out: &mut Vec<u8>,
     ) -> Result<()> {
         let size = header.uncompressed_size;
+        let corrupt = |reason: String| source.corrupt(offset, reason);
         if size > source.limit {
-            return Err(source.too_large(offset, "chunk", size));
+            return Err(match known_size(header, packed) {
+                Some(known) if known != size => corrupt(contradiction(known, size)),
+                _ => source.too_large(offset, "chunk", size),
+            });
         }
         out.clear();
-        let corrupt = |reason: String| source.corrupt(offset, reason);
         match header.compression.as_str() {
             "" => out.extend_from_slice(packed),
             "lz4" => {
@@ -46,7 +49,7 @@ impl Unpacker {
             other => return Err(corrupt(format!("unknown compression {other:?}"))),
         }
         if out.len() as u64 != size {
-            return Err(corrupt(format!("chunk unpacks to {} bytes, its header says {size}", out.len())));
+            return Err(corrupt(contradiction(out.len() as u64, size)));
         }
         let saved = header.uncompressed_crc;
         if saved != 0 {
@@ -89,4 +92,22 @@ impl Unpacker {
             None => Err("zstd: no context".to_owned()),
         }
     }
+}
+
+/// What a chunk unpacks to as far as its content tells it, or the most that it can be.
+fn known_size(header: &ChunkHeader, packed: &[u8]) -> Option<u64> {
+    let len = packed.len() as u64;
+    match header.compression.as_str() {
+        "" => Some(len),
+        // No block of LZ4 grows by more.
+        "lz4" => Some(header.uncompressed_size.min(len.saturating_mul(255))),
+        _ => {
+            let is_one_frame = zstd::zstd_safe::find_frame_compressed_size(packed).ok() == Some(packed.len());
+            zstd::zstd_safe::get_frame_content_size(packed).ok().flatten().filter(|_| is_one_frame)
+        }
+    }
+}
+
+fn contradiction(known: u64, said: u64) -> String {
+    format!("chunk unpacks to {known} bytes, its header says {said}")
 }
