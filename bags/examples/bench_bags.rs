@@ -16,9 +16,10 @@ use std::{
 use serde_json::{Value, json};
 use swath_bags::{
     Bag, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
-    play::{PlayOptions, Player},
+    play::{End, LAST_MESSAGES, PlayOptions, Player},
     qos::QosProfile,
     record::{RecordOptions, Recorder},
+    tap::Selection,
 };
 use swath_msgs::Interface;
 use swath_ros::{
@@ -170,9 +171,11 @@ fn record(dir: &Path) -> Value {
     let names = [TOPIC.to_owned()];
     let options = RecordOptions {
         output: dir.to_owned(),
-        topics: TopicPattern::new(&names, None, None).unwrap(),
-        discover: true,
-        depth: 16_384,
+        selection: Selection {
+            topics: TopicPattern::new(&names, None, None).unwrap(),
+            depth: 16_384,
+            ..Selection::default()
+        },
         ..RecordOptions::default()
     };
     let recorder = Recorder::start(options, &RosArgs::default()).unwrap();
@@ -231,13 +234,14 @@ fn play(bag: &Path, rate: f64) -> Value {
         rate,
         repeat: false,
         start_offset: 0,
-        end_offset: None,
+        end: End::default(),
         delay: Duration::from_secs(2),
         paused: false,
         clock_hz: None,
         remap: BTreeMap::new(),
         qos_overrides: BTreeMap::new(),
         keys: false,
+        acknowledged: Some(LAST_MESSAGES),
     };
     let player = Player::start(options, &RosArgs::default()).unwrap();
     let summary = player.run(&Shutdown::default(), |_| ()).unwrap();
