@@ -76,10 +76,12 @@ fn measure() -> Value {
     let zstd_dir = temp.path().join("zstd");
     let zstd = write(&zstd_dir, Compression::Zstd, &messages, 1_000_000, 1);
     let read = read(&zstd_dir);
+    let many = many_topics(&temp.path().join("many"));
     let mut result = record_over_dds(&temp.path().join("recorded"));
     result["bag_write_MB_per_s"] = json!(none.round());
     result["bag_write_zstd_MB_per_s"] = json!(zstd.round());
     result["bag_read_msgs_per_s"] = json!(read.round());
+    result["bag_60000_topics_s"] = json!(many);
     if let (Value::Object(all), Value::Object(played)) = (&mut result, measure_playing(temp.path(), &messages)) {
         all.extend(played);
     }
@@ -127,6 +129,24 @@ fn read(dir: &Path) -> f64 {
         n += 1.0;
     }
     n / start.elapsed().as_secs_f64()
+}
+
+/// A message of one of 60 000 topics, from the opening of the bag on [s].
+fn many_topics(dir: &Path) -> f64 {
+    let bag = BagWriter::create(dir, BagOptions::default()).unwrap();
+    for n in 0..60_000u64 {
+        let topic =
+            Topic::new(&format!("/t{n}"), "std_msgs/msg/UInt64", "uint64 data\n", "", vec![QosProfile::reliable(1)]);
+        let topic = bag.add_topic(&topic.unwrap()).unwrap();
+        bag.write(topic, n, n, &message(n)).unwrap();
+    }
+    bag.close().unwrap();
+    let start = Instant::now();
+    let bag = Bag::open(dir).unwrap();
+    let topics = TopicPattern::new(&["/t30000".to_owned()], None, None).unwrap();
+    let mut messages = bag.messages(&Filter { topics, ..Filter::default() }).unwrap();
+    assert_eq!(messages.next().unwrap().unwrap().log_time, 30_000);
+    start.elapsed().as_secs_f64()
 }
 
 /// A publisher and a recorder, each in its process.

@@ -194,7 +194,12 @@ output_bags:
         "one: 48 messages\n"
     );
     assert!(run(dir, &["validate", "one"]).ends_with("48 messages on 6 topics checked: 0 faults, 0 warnings\n"));
+}
 
+#[test]
+fn output_options_that_are_not_understood_are_refused_before_anything_is_written() {
+    let temp = sample();
+    let dir = temp.path();
     for (yaml, reason) in [
         ("output_bags: [{uri: x, storage_id: sqlite3}]", "storage_id \"sqlite3\" is not written, only mcap is"),
         ("output_bags: [{uri: x, all_topcis: true}]", "unknown field `all_topcis`"),

@@ -76,6 +76,7 @@ impl Listing {
             let file = base.join(listed);
             let beside = || dir.join(Path::new(listed).file_name().unwrap_or_default());
             match [file.clone(), beside()].into_iter().find(|file| file.is_file()) {
+                Some(file) if self.files.contains(&file) => {}
                 Some(file) => self.files.push(file),
                 None => self.faults.push(format!("{} is missing, the bag's list has it", file.display())),
             }
