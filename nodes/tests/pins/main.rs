@@ -1,0 +1,13 @@
+//! Pins: what the programs say and write, held against golden files, from outside and through files only, so that they
+//! stay true whatever becomes of the crates. `SWATH_BLESS=1` writes the golden files anew.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
+
+mod bags;
+#[path = "../common/mod.rs"]
+mod common;
+mod golden;
+mod help;
+mod missions;
+mod place;
+mod refusals;
+mod training;
