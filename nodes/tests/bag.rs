@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 use serde_json::Value;
 use swath_bags::cli::{MANIFEST, MANIFEST_TEXT};
 use swath_bags::{Bag, BagOptions, BagWriter, Filter};
-use swath_nodes::bag::recorded::{NAMESPACE, Recorded};
+use swath_ground::debrief::recorded::{NAMESPACE, Recorded};
 
 fn sample() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../bags/samples/mission")

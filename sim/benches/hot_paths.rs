@@ -5,17 +5,18 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use swath_sim::catalogue::Catalogue;
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig};
-use swath_sim::flight::Flight;
+use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
-use swath_sim::orbit::Orbit;
 use swath_sim::planner::{Decision, Heuristic, Planner};
+use swath_sim::requests::catalogue::Catalogue;
+use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
-use swath_sim::scenario::{InitialState, ScenarioConfig};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::world::orbit::Orbit;
 
 fn model() -> Arc<Model> {
     Arc::new(Model::new(SimConfig::default()).unwrap())

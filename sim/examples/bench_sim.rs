@@ -6,18 +6,19 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
-use swath_sim::catalogue::Catalogue;
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig};
-use swath_sim::flight::Flight;
+use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
-use swath_sim::orbit::Orbit;
 use swath_sim::planner::{Beam, Heuristic, Lookahead, Planner};
+use swath_sim::requests::catalogue::Catalogue;
+use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
-use swath_sim::scenario::{InitialState, ScenarioConfig};
-use swath_sim::strip::StripRequest;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::world::orbit::Orbit;
+use swath_sim::world::strip::StripRequest;
 
 /// Each figure is the median of this many runs.
 const RUNS: usize = 9;

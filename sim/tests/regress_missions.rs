@@ -4,10 +4,11 @@
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
+use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
 use swath_sim::planner::{Beam, BeamSearch, Decision, Heuristic, Lookahead, Planner, Random};
+use swath_sim::task::{TaskRecord, Totals};
 
 fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<TaskRecord> {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());

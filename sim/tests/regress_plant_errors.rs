@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
+use swath_sim::learn::env::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::{Beam, Experience, Heuristic, Lookahead, Planner};
-use swath_sim::plant_errors::PlantErrors;
+use swath_sim::task::{TaskRecord, Totals};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::errors::PlantErrors;
 
 fn env(episode: &EpisodeConfig, seed: u64) -> Env {
     Env::episode(Arc::new(Model::new(SimConfig::default()).unwrap()), episode, seed)
@@ -144,7 +145,7 @@ fn requests_come_in_flight_and_never_before_their_time() {
 fn the_first_requests_are_the_same_whether_others_come_or_not() {
     let (all, some) = (env(&two_orbits(), 8), env(&EpisodeConfig { arrivals: 0.3, ..two_orbits() }, 8));
     for id in 1..=some.catalogue().len() as u64 {
-        let strip = |env: &Env| env.catalogue().get(swath_sim::strip::StripId(id)).unwrap().strip;
+        let strip = |env: &Env| env.catalogue().get(swath_sim::world::strip::StripId(id)).unwrap().strip;
         assert_eq!(strip(&all), strip(&some));
     }
     assert!(EpisodeConfig { arrivals: 1.5, ..two_orbits() }.validate().is_err());

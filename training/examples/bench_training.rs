@@ -5,14 +5,13 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use swath_sim::env::{Env, EpisodeConfig};
+use swath_sim::learn::env::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::Planner;
-use swath_training::checkpoint;
 use swath_training::config::{EnvironmentConfig, RunConfig};
 use swath_training::policy::{LearnedPlanner, Policy};
-use swath_training::process;
 use swath_training::trainer::Trainer;
+use swath_training::{checkpoint, process};
 use tch::Device;
 
 /// Decisions whose time is taken.

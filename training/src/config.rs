@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
-use swath_sim::env::EpisodeConfig;
-use swath_sim::observation::ObservationSet;
+use swath_sim::learn::env::EpisodeConfig;
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::planner::PlannerSpec;
 
 use crate::error::{Result, TrainingError};

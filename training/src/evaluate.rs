@@ -5,10 +5,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, Totals};
+use swath_sim::learn::env::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::{Planner, PlannerSpec};
-use swath_sim::plant_errors::PlantErrors;
+use swath_sim::task::Totals;
+use swath_sim::vehicle::errors::PlantErrors;
 
 use crate::error::{Result, TrainingError};
 use crate::planners;

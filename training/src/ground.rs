@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use swath_sim::env::{Env, EpisodeConfig};
-use swath_sim::ground::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
+use swath_sim::foresight::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
+use swath_sim::learn::env::{Env, EpisodeConfig};
 use swath_sim::model::Model;
-use swath_sim::plant_errors::PlantErrors;
+use swath_sim::vehicle::errors::PlantErrors;
 
 use crate::error::{Result, TrainingError};
 use crate::evaluate::{Mission, Missions, mission};

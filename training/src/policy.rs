@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use swath_sim::observation::{ObservationSet, observe};
+use swath_sim::learn::observation::{ObservationSet, observe};
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Rationale};
 use tch::{Device, Tensor};
 

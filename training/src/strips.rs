@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use swath_sim::env::{Env, EpisodeConfig};
+use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
 use swath_sim::planner::{Decision, Planner, PlannerSpec};
 
 use crate::config::StripsConfig;
@@ -115,7 +115,7 @@ impl Environment for Strips {
     }
 
     fn reporting_period_s(&self) -> f64 {
-        let orbit = swath_sim::env::horizon(&self.model, 1.0);
+        let orbit = swath_sim::mission::horizon(&self.model, 1.0);
         self.model.period.time_s(orbit)
     }
 

@@ -12,11 +12,10 @@ pub use spec::{PlannerSpec, UnknownPlanner};
 
 use thiserror::Error;
 
-use crate::catalogue::Candidate;
-use crate::env::TaskRecord;
-use crate::flight::Situation;
-use crate::guidance::Task;
 use crate::model::Model;
+use crate::requests::catalogue::Candidate;
+use crate::task::{Task, TaskRecord};
+use crate::vehicle::flight::Situation;
 
 /// Everything that a decision rests on.
 #[derive(Clone, Copy, Debug)]

@@ -7,10 +7,10 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use swath_sim::config::SimConfig;
-use swath_sim::env::EpisodeConfig;
+use swath_sim::learn::env::EpisodeConfig;
 use swath_sim::planner::PlannerSpec;
-use swath_sim::plant_errors::PlantErrors;
-use swath_sim::scenario::ScenarioConfig;
+use swath_sim::requests::scenario::ScenarioConfig;
+use swath_sim::vehicle::errors::PlantErrors;
 use swath_training::evaluate::{Mission, Missions, Spread, fly, spread, spread_of};
 use swath_training::process;
 

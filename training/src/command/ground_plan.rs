@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Value, json};
-use swath_sim::ground::GroundSettings;
+use swath_sim::foresight::GroundSettings;
 use swath_training::evaluate::{Mission, spread, spread_of};
 use swath_training::ground::{Bracket, brackets};
 

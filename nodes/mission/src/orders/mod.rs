@@ -1,0 +1,3 @@
+//! Orders: what is asked for, and the files that it comes in.
+
+pub mod geojson;
