@@ -262,7 +262,7 @@ fn the_report_shows_what_was_flown() {
     assert!(count("map", "#E8E4DA") > 100, "land");
     assert!((1..=3).contains(&count("map", blue)), "the ground track, cut at the antimeridian");
     assert_eq!(count("timeline", green), imaged, "a bar for each strip that was imaged");
-    let transitions = recorded.tasks.iter().filter(|(record, _)| record.t_pre > 0).count() as u64;
+    let transitions = recorded.tasks.iter().filter(|(task, _)| task.record.t_pre > 0).count() as u64;
     assert_eq!(count("timeline", amber), transitions);
     assert_eq!(count("timeline", red), recorded.tasks.len() as u64 - imaged);
     for figure in ["attitude", "wheel-speed", "wheel-torque", "reward", "requests"] {

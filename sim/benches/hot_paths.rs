@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use swath_sim::config::SimConfig;
-use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Heuristic, Planner};
@@ -16,6 +16,7 @@ use swath_sim::rng;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 
 fn model() -> Arc<Model> {
@@ -30,7 +31,7 @@ fn closed_loop(c: &mut Criterion) {
     let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
     c.bench_function("fly one task of some 300 ticks", |b| {
         b.iter_batched(
-            || Flight::new(&model, &model, &initial),
+            || Flight::new(&model, Spacecraft::new(&model, &initial)),
             |mut flight| flight.fly(task, Tick(u64::MAX)),
             criterion::BatchSize::SmallInput,
         );

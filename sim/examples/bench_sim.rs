@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use swath_sim::config::SimConfig;
-use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
 use swath_sim::planner::{Beam, Heuristic, Lookahead, Planner};
@@ -17,6 +17,7 @@ use swath_sim::rng;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripRequest;
 
@@ -56,7 +57,8 @@ fn closed_loop(model: &Arc<Model>) -> Result<f64> {
     let mut rates = Vec::new();
     for seed in 0..RUNS as u64 {
         let env = Env::episode(model.clone(), &EpisodeConfig::evaluation(), seed);
-        let mut flight = Flight::new(model, model, &InitialState::draw(&model.config, &mut rng::stream(seed, 0)));
+        let initial = InitialState::draw(&model.config, &mut rng::stream(seed, rng::INITIAL_STATE));
+        let mut flight = Flight::new(model, Spacecraft::new(model, &initial));
         let context = env.context();
         let tasks = (0..context.candidates.len())
             .map(|candidate| swath_sim::planner::Decision::Image { candidate, t_pre: 160 }.to_task(&context))

@@ -12,6 +12,8 @@ use crate::world::strip::{Strip, StripId};
 pub enum Task {
     /// Slew for `t_pre` ticks, then image the strip for `t_acq` ticks.
     Image {
+        /// Identity of the strip in the mission.
+        id: StripId,
         /// The strip.
         strip: Strip,
         /// Transition time T_pre [ticks].
@@ -33,6 +35,15 @@ impl Task {
         match *self {
             Self::Image { t_pre, t_acq, .. } => t_pre + t_acq,
             Self::Wait { ticks } => ticks,
+        }
+    }
+
+    /// The strip that it images; `None` for a wait.
+    #[must_use]
+    pub fn strip(&self) -> Option<StripId> {
+        match *self {
+            Self::Image { id, .. } => Some(id),
+            Self::Wait { .. } => None,
         }
     }
 }
@@ -83,11 +94,19 @@ pub struct TaskRecord {
     pub t_acq: u32,
     /// How it went.
     pub outcome: TaskOutcome,
-    /// The strip's priority when this fulfilled it, else 0.
-    pub reward: f64,
 }
 
 impl TaskRecord {
+    /// The record of task `number`, flown from `start` to `end`.
+    #[must_use]
+    pub fn new(number: u64, task: &Task, start: Tick, end: Tick, outcome: TaskOutcome) -> Self {
+        let (t_pre, t_acq) = match *task {
+            Task::Image { t_pre, t_acq, .. } => (t_pre, t_acq),
+            Task::Wait { .. } => (0, 0),
+        };
+        Self { task: number, start, end, strip: task.strip(), t_pre, t_acq, outcome }
+    }
+
     /// Whether a strip was imaged.
     #[must_use]
     pub fn success(&self) -> bool {
@@ -99,6 +118,15 @@ impl TaskRecord {
     pub fn ticks(&self) -> u32 {
         self.end.since(self.start) as u32
     }
+}
+
+/// A task whose reward has been settled by whoever keeps the requests.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SettledTask {
+    /// The task as it was flown.
+    pub record: TaskRecord,
+    /// The strip's priority when this fulfilled it, else 0.
+    pub reward: f64,
 }
 
 /// Totals over the tasks of a mission.
@@ -124,8 +152,9 @@ pub struct Totals {
 
 impl Totals {
     /// Counts a task.
-    pub fn add(&mut self, record: &TaskRecord) {
-        self.reward += record.reward;
+    pub fn add(&mut self, settled: &SettledTask) {
+        let record = &settled.record;
+        self.reward += settled.reward;
         if record.strip.is_none() {
             self.wait_ticks += u64::from(record.ticks());
             return;

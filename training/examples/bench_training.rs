@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::Planner;
 use swath_training::config::{EnvironmentConfig, RunConfig};

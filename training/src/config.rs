@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
-use swath_sim::learn::env::EpisodeConfig;
+use swath_sim::learn::episode::EpisodeConfig;
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::planner::PlannerSpec;
 

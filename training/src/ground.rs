@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 use swath_sim::foresight::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
-use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::vehicle::errors::PlantErrors;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use swath_sim::learn::env::{Env, EpisodeConfig};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Planner, PlannerSpec};
@@ -107,7 +107,7 @@ impl Environment for Strips {
         let waited_s = self.wait_for_candidates()?
             + self.teacher.as_mut().map_or(0.0, |teacher| std::mem::take(&mut teacher.waited_s));
         Ok(Outcome {
-            reward: step.record.reward,
+            reward: step.reward,
             duration_s: self.model.period.duration_s(step.record.ticks()) + waited_s,
             success: step.record.success(),
             progress: if step.truncated { Progress::Truncated } else { Progress::Continues },
@@ -206,9 +206,9 @@ mod tests {
         let (mut flown, mut waits) = (Vec::new(), 0);
         while !env.truncated() {
             let decision = planner.decide(&env.context()).unwrap();
-            let record = env.step(decision).unwrap().record;
+            let step = env.step(decision).unwrap();
             match decision {
-                Decision::Image { .. } => flown.push((record.reward, record.success())),
+                Decision::Image { .. } => flown.push((step.reward, step.record.success())),
                 Decision::Wait { .. } => waits += 1,
             }
         }

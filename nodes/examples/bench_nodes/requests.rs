@@ -178,7 +178,7 @@ fn next_n(mission: &Path, store: &Path) -> Result<f64> {
     let horizon = mission.horizon(&model);
     let snapshot = Store::open_read_only(store)?.snapshot()?;
     let mut logic = RequestLogic::new(model, &mission.initial(), horizon, mission.rules());
-    logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress)?;
+    logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled)?;
     ensure!(logic.len() == MANY as usize, "{} strips are held", logic.len());
     let mut longest: f64 = 0.0;
     for (task, tick) in (0..horizon.0).step_by(250).enumerate() {

@@ -12,7 +12,9 @@ use swath_sim::planner::PlannerSpec;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::spacecraft::Spacecraft;
 use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
@@ -94,6 +96,13 @@ pub struct Mission {
     pub initial: Option<InitialState>,
     /// Physics and the planning problem.
     pub sim: SimConfig,
+    /// How the satellite that is flown differs from what guidance and planner believe of it.
+    #[serde(skip_serializing_if = "is_exact")]
+    pub plant: PlantErrors,
+}
+
+fn is_exact(plant: &PlantErrors) -> bool {
+    *plant == PlantErrors::default()
 }
 
 /// Strips known from the start.
@@ -131,6 +140,7 @@ impl Default for Mission {
             hold_s: 10.0,
             initial: None,
             sim: SimConfig::default(),
+            plant: PlantErrors::default(),
         }
     }
 }
@@ -175,6 +185,7 @@ impl Mission {
         if let Some(scenario) = &self.requests.random {
             scenario.validate()?;
         }
+        self.plant.validate()?;
         Ok(self.sim.validate()?)
     }
 
@@ -189,6 +200,16 @@ impl Mission {
     #[must_use]
     pub fn initial(&self) -> InitialState {
         self.initial.unwrap_or_else(|| InitialState::draw(&self.sim, &mut rng::stream(self.seed, rng::INITIAL_STATE)))
+    }
+
+    /// The satellite at the epoch, with its errors.
+    ///
+    /// # Errors
+    /// When what the errors make of the configuration is out of range.
+    pub fn spacecraft(&self, model: &Model) -> Result<Spacecraft, MissionError> {
+        let mut spacecraft = Spacecraft::new(model, &self.initial());
+        spacecraft.differ(model, &self.plant, self.seed)?;
+        Ok(spacecraft)
     }
 
     /// The constants of the physics and the planning problem.

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
+use swath_sim::mission::{Mission as Loop, RequestKeeper};
 use swath_sim::model::Model;
-use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
-use swath_sim::task::{Task, TaskRecord};
-use swath_sim::time::Tick;
-use swath_sim::vehicle::flight::Flight;
+use swath_sim::planner::{Planner, PlannerError};
+use swath_sim::requests::catalogue::Candidate;
+use swath_sim::task::{SettledTask, TaskRecord};
+use swath_sim::vehicle::flight::{Flight, Situation};
 use thiserror::Error;
 
 use crate::file::{Mission, MissionError};
-use crate::orders::geojson::NamedRequest;
 use crate::outcome::TaskLine;
 use crate::requests::logic::RequestLogic;
 
@@ -25,16 +25,23 @@ pub enum InProcessError {
     Planner(#[from] PlannerError),
 }
 
-/// A mission ready to be flown in this process: the request manager of the nodes, and the flight of the simulation.
+impl RequestKeeper for RequestLogic {
+    fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
+        self.set_situation(*situation);
+        *candidates = self.on_decision_point(task, situation.now, &[]).candidates;
+        // Nobody keeps a journal here.
+        self.take_journal();
+    }
+
+    fn settle(&mut self, record: &TaskRecord) -> f64 {
+        self.on_result(record)
+    }
+}
+
+/// A mission ready to be flown in this process: the loop of the simulation around the request manager of the nodes.
 pub struct InProcessMission {
-    model: Arc<Model>,
-    horizon: Tick,
-    flight: Flight,
-    requests: RequestLogic,
+    mission: Loop<RequestLogic>,
     requested: usize,
-    /// Number of the task to decide.
-    task: u64,
-    finished: Option<TaskRecord>,
 }
 
 impl InProcessMission {
@@ -45,63 +52,54 @@ impl InProcessMission {
     pub fn new(mission: &Mission) -> Result<Self, InProcessError> {
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
-        let initial = mission.initial();
-        let mut prepared = Self {
-            flight: Flight::new(&model, &model, &initial),
-            requests: RequestLogic::new((*model).clone(), &initial, horizon, mission.rules()),
-            model,
-            horizon,
-            requested: 0,
-            task: 0,
-            finished: None,
-        };
-        prepared.submit(&mission.initial_requests()?);
-        Ok(prepared)
-    }
-
-    /// Adds requests at the present decision.
-    pub fn submit(&mut self, requests: &[NamedRequest]) {
-        self.submit_since(requests, self.flight.now());
-    }
-
-    /// Adds requests that came at an earlier tick.
-    pub fn submit_since(&mut self, requests: &[NamedRequest], since: Tick) {
-        self.requested += requests.len();
-        for named in requests {
+        let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
+        let initial = mission.initial_requests()?;
+        let requested = initial.len();
+        for named in initial {
             // Why one is refused is in the request manager's counts.
-            let _ = self.requests.submit_since(named.clone(), since);
+            _ = requests.submit(named);
         }
+        let flight = Flight::new(&model, mission.spacecraft(&model)?);
+        let delay = model.period.ticks_ceil(mission.plant.planning_delay_s);
+        let mut mission = Loop::new(model, flight, requests, horizon);
+        mission.set_planning_delay(delay);
+        Ok(Self { mission, requested })
+    }
+
+    /// Does something with the requests at the present decision.
+    pub fn change<R>(&mut self, change: impl FnOnce(&mut RequestLogic) -> R) -> R {
+        self.mission.change(change)
     }
 
     /// Constants of the mission.
     #[must_use]
     pub fn model(&self) -> &Arc<Model> {
-        &self.model
+        self.mission.model()
     }
 
     /// The request manager.
     #[must_use]
     pub fn requests(&self) -> &RequestLogic {
-        &self.requests
+        self.mission.keeper()
     }
 
-    /// Strips asked for, and strips that were not refused.
+    /// Strips asked for at the start, and strips that were not refused.
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
-        (self.requested, self.requests.len())
+        (self.requested, self.requests().len())
     }
 
-    /// Decides and flies to the end, handing each task's record and line to `each`.
+    /// Decides and flies to the end, handing each task and its line to `each`.
     ///
     /// # Errors
     /// The first error of the planner.
     pub fn run(
         &mut self,
         planner: &mut dyn Planner,
-        mut each: impl FnMut(&TaskRecord, TaskLine),
+        mut each: impl FnMut(&SettledTask, TaskLine),
     ) -> Result<(), InProcessError> {
-        while let Some((record, line)) = self.step(planner)? {
-            each(&record, line);
+        while let Some((settled, line)) = self.step(planner)? {
+            each(&settled, line);
         }
         Ok(())
     }
@@ -110,33 +108,10 @@ impl InProcessMission {
     ///
     /// # Errors
     /// When the planner gave no usable decision.
-    pub fn step(&mut self, planner: &mut dyn Planner) -> Result<Option<(TaskRecord, TaskLine)>, InProcessError> {
-        let situation = self.flight.situation();
-        let (now, task) = (situation.now, self.task);
-        let offer = self.requests.on_decision_point(task, now, self.finished.as_slice());
-        // Nobody keeps a journal here.
-        self.requests.take_journal();
-        if now >= self.horizon {
-            return Ok(None);
-        }
-        let candidates = &offer.candidates;
-        let previous = self.finished.as_ref();
-        let context = DecisionContext { task, situation: &situation, candidates, previous, model: &self.model };
-        let decision = planner.decide(&context)?;
-        let kind = decision.to_task(&context)?;
-        let (strip, t_pre, t_acq, priority) = match (decision, kind) {
-            (Decision::Image { candidate, .. }, Task::Image { strip, t_pre, t_acq }) => {
-                (candidates.get(candidate).map(|candidate| candidate.id), t_pre, t_acq, strip.priority)
-            }
-            _ => (None, 0, 0, 0.0),
-        };
-        let outcome = self.flight.fly(kind, self.horizon);
-        let reward = if strip.is_some() && outcome.failure.is_none() { priority } else { 0.0 };
-        let record = TaskRecord { task, start: now, end: self.flight.now(), strip, t_pre, t_acq, outcome, reward };
-        let name = strip.and_then(|id| self.requests.request(id)).map(|request| request.named.name.as_str());
-        let line = TaskLine::new(&record, name);
-        self.task += 1;
-        self.finished = Some(record.clone());
-        Ok(Some((record, line)))
+    pub fn step(&mut self, planner: &mut dyn Planner) -> Result<Option<(SettledTask, TaskLine)>, InProcessError> {
+        let Some(settled) = self.mission.fly_one(planner)? else { return Ok(None) };
+        let request = settled.record.strip.and_then(|id| self.requests().request(id));
+        let line = TaskLine::new(&settled, request.map(|request| request.named.name.as_str()));
+        Ok(Some((settled, line)))
     }
 }

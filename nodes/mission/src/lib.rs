@@ -9,4 +9,5 @@ pub mod in_process;
 pub mod orders;
 pub mod outcome;
 pub mod requests;
+pub mod task_log;
 pub mod time_text;

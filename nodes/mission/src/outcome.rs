@@ -1,7 +1,7 @@
 //! What a mission leaves behind beside its bag: a line a task, and a summary.
 
 use serde::{Deserialize, Serialize};
-use swath_sim::task::{FailureReason, TaskRecord, Totals};
+use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
 /// One line of `tasks.jsonl`.
@@ -36,7 +36,8 @@ pub struct TaskLine {
 impl TaskLine {
     /// The line of a task; `name` is its strip's.
     #[must_use]
-    pub fn new(record: &TaskRecord, name: Option<&str>) -> Self {
+    pub fn new(settled: &SettledTask, name: Option<&str>) -> Self {
+        let record = &settled.record;
         Self {
             task: record.task,
             start_tick: record.start.0,
@@ -49,7 +50,7 @@ impl TaskLine {
             reason: record.strip.and(record.outcome.failure),
             max_attitude_error: record.outcome.max_attitude_error,
             min_elevation_deg: record.outcome.min_elevation.to_degrees(),
-            reward: record.reward,
+            reward: settled.reward,
         }
     }
 }

@@ -102,6 +102,7 @@ pub fn state_sample(state: &msg::SpacecraftState) -> Result<StateSample, Message
         tick: Tick(state.tick),
         r_BN_N: checked("r_bn_n", components(&state.r_bn_n), POSITION_MAX)?,
         v_BN_N: checked("v_bn_n", components(&state.v_bn_n), VELOCITY_MAX)?,
+        truth: None,
         body: BodyState {
             sigma_BN: checked("sigma_bn", state.sigma_bn, 1.0 + 1e-9)?,
             omega_BN_B: checked("omega_bn_b", components(&state.omega_bn_b), RATE_MAX)?,
@@ -139,8 +140,7 @@ pub fn task_record(result: &msg::TaskResult) -> Result<TaskRecord, MessageError>
         msg::TaskResult::REASON_INTERRUPTED => Some(FailureReason::Interrupted),
         value => return Err(MessageError::Constant { field: "reason", value }),
     };
-    let numbers = [result.max_attitude_error, result.min_elevation, result.reward];
-    checked("task result", numbers, RESULT_MAX)?;
+    checked("task result", [result.max_attitude_error, result.min_elevation, 0.0], RESULT_MAX)?;
     Ok(TaskRecord {
         task: result.task,
         start: Tick(result.start_tick),
@@ -153,7 +153,6 @@ pub fn task_record(result: &msg::TaskResult) -> Result<TaskRecord, MessageError>
             max_attitude_error: result.max_attitude_error,
             min_elevation: result.min_elevation,
         },
-        reward: result.reward,
     })
 }
 

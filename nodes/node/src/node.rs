@@ -15,7 +15,11 @@ use swath_mission::file::Mission;
 
 /// Own words of a node's command line; everything else is a ROS parameter.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = "Example: swath-guidance --ros-args -p mission:=out/mission.toml")]
+#[command(
+    version,
+    about = "Nodes, launcher and operator command line of Swath",
+    after_help = "Example: swath-guidance --ros-args -p mission:=out/mission.toml"
+)]
 struct NodeArgs {}
 
 /// A started node and the mission that it flies.

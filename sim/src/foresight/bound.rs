@@ -1,7 +1,7 @@
 //! What no plan can exceed: imaging as a liquid, and slewing for nothing.
 
 use super::passes::Passes;
-use crate::learn::env::Env;
+use crate::learn::episode::Env;
 
 /// Width of the bins of time [ticks].
 const BIN: u64 = 120;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::passes::Passes;
 use super::{Plan, PlannedTask};
-use crate::learn::env::Env;
+use crate::learn::episode::Env;
 use crate::model::Model;
 use crate::planner::{Allowance, Search};
 use crate::requests::catalogue::Candidate;

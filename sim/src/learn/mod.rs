@@ -1,4 +1,4 @@
 //! What a learner meets: episodes, observations, hybrid actions.
 
-pub mod env;
+pub mod episode;
 pub mod observation;

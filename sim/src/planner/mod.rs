@@ -91,7 +91,7 @@ impl Decision {
                 if t_pre > max {
                     return Err(PlannerError::TransitionTooLong { t_pre, max });
                 }
-                Ok(Task::Image { strip: chosen.strip, t_pre, t_acq: chosen.t_acq })
+                Ok(Task::Image { id: chosen.id, strip: chosen.strip, t_pre, t_acq: chosen.t_acq })
             }
             Self::Wait { ticks: 0 } => Err(PlannerError::EmptyWait),
             Self::Wait { ticks } => Ok(Task::Wait { ticks }),

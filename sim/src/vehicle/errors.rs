@@ -93,11 +93,17 @@ impl PlantErrors {
         Ok(Plant::new(&config.spacecraft, model.period.seconds()))
     }
 
+    /// Whether what the sensors measure differs from what is.
+    #[must_use]
+    pub fn noisy(&self) -> bool {
+        self.attitude_noise_rad > 0.0 || self.rate_noise_rad_s > 0.0
+    }
+
     /// What attitude and rate are seen through, if not exactly.
     #[must_use]
     pub fn sensor(&self, rng: Rng) -> Option<Sensor> {
         let (attitude, rate) = (self.attitude_noise_rad, self.rate_noise_rad_s);
-        (attitude > 0.0 || rate > 0.0).then_some(Sensor { rng, attitude, rate })
+        self.noisy().then_some(Sensor { rng, attitude, rate })
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod control;
 pub mod dynamics;
 pub mod errors;
+pub mod executive;
 pub mod flight;
 pub mod guidance;
 pub mod initial;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use swath_sim::config::SimConfig;
-use swath_sim::learn::env::EpisodeConfig;
+use swath_sim::learn::episode::EpisodeConfig;
 use swath_sim::planner::PlannerSpec;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::vehicle::errors::PlantErrors;

@@ -12,13 +12,14 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::messages::{request_of_strip, task_record};
 use swath_ros::{Cdr, decode, graph};
 use swath_sim::model::Model;
-use swath_sim::task::TaskRecord;
+use swath_sim::task::SettledTask;
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::geojson::NamedRequest;
 use swath_mission::outcome::TaskLine;
+use swath_mission::task_log::TaskLog;
 
 /// The namespace in which a mission's nodes run unless they are told otherwise.
 pub const NAMESPACE: &str = "/swath";
@@ -32,7 +33,7 @@ pub struct Recorded {
     /// Its constants.
     pub model: Arc<Model>,
     /// Each task's record and line, by number.
-    pub tasks: Vec<(TaskRecord, TaskLine)>,
+    pub tasks: Vec<(SettledTask, TaskLine)>,
     /// What the planner was offered, by number of the task.
     pub offers: BTreeMap<u64, msg::UpcomingStrips>,
     /// What the planner said of its choice, by number of the task.
@@ -86,6 +87,19 @@ impl Recorded {
         Ok(recorded)
     }
 
+    fn name_of<M>(&self, topic: &graph::Topic<M>) -> String {
+        match topic.entry.name.starts_with('/') {
+            true => topic.entry.name.to_owned(),
+            false => format!("{}/{}", self.namespace, topic.entry.name),
+        }
+    }
+
+    /// Whether the bag has a topic.
+    fn has<M>(&self, topic: &graph::Topic<M>) -> bool {
+        let name = self.name_of(topic);
+        self.bag.topics().iter().any(|recorded| recorded.topic.name == name)
+    }
+
     /// Hands each message of a topic to `each`, in order of time.
     ///
     /// # Errors
@@ -95,10 +109,7 @@ impl Recorded {
         topic: &graph::Topic<M>,
         mut each: impl FnMut(M) -> Result<()>,
     ) -> Result<()> {
-        let name = match topic.entry.name.starts_with('/') {
-            true => topic.entry.name.to_owned(),
-            false => format!("{}/{}", self.namespace, topic.entry.name),
-        };
+        let name = self.name_of(topic);
         let recorded = self.bag.topics().iter().find(|t| t.topic.name == name);
         let Some(recorded) = recorded else { bail!("the bag has no topic {name}: is --namespace right?") };
         let type_name = &recorded.topic.type_name;
@@ -139,17 +150,27 @@ impl Recorded {
     }
 
     fn read_points(&mut self) -> Result<()> {
-        let (mut tasks, mut complete) = (Vec::new(), false);
+        let (mut log, mut complete) = (TaskLog::default(), false);
+        // Before the request manager settled rewards, guidance told of them.
+        let settled_apart = self.has(&graph::TASK_RESULTS);
         self.for_each(&graph::DECISION_POINT, |point| {
             complete |= point.mission_over;
-            if let Some(result) = point.result.first().filter(|result| result.task == tasks.len() as u64) {
-                let record = task_record(result)?;
-                let line = TaskLine::new(&record, record.strip.map(|_| result.strip_name.as_str()));
-                tasks.push((record, line));
+            if let Some(result) = point.result.first() {
+                log.flown(task_record(result)?, &result.strip_name);
+                if !settled_apart {
+                    log.settled(result.task, result.reward);
+                }
             }
             Ok(())
         })?;
-        (self.tasks, self.complete) = (tasks, complete);
+        if settled_apart {
+            self.for_each(&graph::TASK_RESULTS, |result| {
+                log.settled(result.task, result.reward);
+                Ok(())
+            })?;
+        }
+        log.give_up();
+        (self.tasks, self.complete) = (log.take(), complete);
         Ok(())
     }
 
@@ -210,7 +231,7 @@ impl Recorded {
     /// Numbers of the strips that were imaged.
     #[must_use]
     pub fn imaged(&self) -> BTreeSet<StripId> {
-        self.tasks.iter().filter(|(record, _)| record.success()).filter_map(|(record, _)| record.strip).collect()
+        self.tasks.iter().map(|(task, _)| &task.record).filter(|it| it.success()).filter_map(|it| it.strip).collect()
     }
 }
 

@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, PlannerSpec};
-use swath_sim::task::{TaskRecord, Totals};
+use swath_sim::task::{SettledTask, Totals};
 
 use super::recorded::{NAMESPACE, Recorded};
 use swath_mission::guarded::{GuardedPlanner, Policies};
@@ -89,7 +89,7 @@ pub struct Pair {
 
 /// A flight in process: each task, and the numbers of the strips that it was chosen from.
 struct Flown {
-    tasks: Vec<(TaskRecord, TaskLine)>,
+    tasks: Vec<(SettledTask, TaskLine)>,
     candidates: Vec<Vec<u64>>,
 }
 
@@ -134,7 +134,8 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Resul
     let mut tasks = Vec::new();
     loop {
         while let Some(arrival) = arrivals.next_if(|arrival| arrival.decision <= tasks.len() as u64) {
-            flight.submit_since(std::slice::from_ref(&arrival.request), arrival.since);
+            // Why one is refused is in the request manager's counts.
+            _ = flight.change(|requests| requests.submit_at(arrival.request.clone(), arrival.since));
         }
         match flight.step(&mut planner)? {
             Some(task) => tasks.push(task),
@@ -168,7 +169,7 @@ fn compare(recorded: &Recorded, flown: &Flown, planner: &PlannerSpec) -> Result<
     };
     let mut decisions = Vec::new();
     for task in 0..count {
-        let line = |tasks: &[(TaskRecord, TaskLine)]| tasks.get(task).map(|(_, line)| line.clone());
+        let line = |tasks: &[(SettledTask, TaskLine)]| tasks.get(task).map(|(_, line)| line.clone());
         let (then, now) = (line(&recorded.tasks), line(&flown.tasks));
         let bytes = |line: &Option<TaskLine>| line.as_ref().map(json_line).transpose();
         let offered = recorded.offers.get(&(task as u64));
@@ -182,8 +183,8 @@ fn compare(recorded: &Recorded, flown: &Flown, planner: &PlannerSpec) -> Result<
         });
     }
     let flown = &flown.tasks[..flown.tasks.len().min(count)];
-    let strips = |tasks: &[(TaskRecord, TaskLine)]| -> BTreeSet<_> {
-        tasks.iter().filter(|(record, _)| record.success()).filter_map(|(record, _)| record.strip).collect()
+    let strips = |tasks: &[(SettledTask, TaskLine)]| -> BTreeSet<_> {
+        tasks.iter().map(|(task, _)| &task.record).filter(|it| it.success()).filter_map(|it| it.strip).collect()
     };
     let (then, now) = (strips(&recorded.tasks), strips(flown));
     Ok(Comparison {
@@ -202,9 +203,9 @@ fn compare(recorded: &Recorded, flown: &Flown, planner: &PlannerSpec) -> Result<
     })
 }
 
-fn totals(tasks: &[(TaskRecord, TaskLine)]) -> Totals {
+fn totals(tasks: &[(SettledTask, TaskLine)]) -> Totals {
     let mut totals = Totals::default();
-    tasks.iter().for_each(|(record, _)| totals.add(record));
+    tasks.iter().for_each(|(task, _)| totals.add(task));
     totals
 }
 

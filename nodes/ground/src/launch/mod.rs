@@ -120,9 +120,9 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     let mut progress = Progress::new(horizon, period);
     let started = Instant::now();
     let mut failed = None;
-    flight.run(&mut planner, |record, line| {
-        totals.add(record);
-        progress.task(record.end, &totals);
+    flight.run(&mut planner, |settled, line| {
+        totals.add(settled);
+        progress.task(settled.record.end, &totals);
         if let Err(error) = output.write_task(&line) {
             failed.get_or_insert(error);
         }

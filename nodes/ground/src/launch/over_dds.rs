@@ -10,6 +10,7 @@ use swath_node::messages::task_record;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph};
 use swath_sim::model::Model;
 use swath_sim::task::Totals;
+
 use swath_sim::time::Tick;
 
 use super::fleet::Fleet;
@@ -17,7 +18,8 @@ use super::output::OutputFolder;
 use super::progress::Progress;
 use swath_mission::file::Mission;
 use swath_mission::guarded::Policies;
-use swath_mission::outcome::{Summary, SummaryInputs, TaskLine};
+use swath_mission::outcome::{Summary, SummaryInputs};
+use swath_mission::task_log::TaskLog;
 
 /// How long the recorder may take to come up.
 const RECORDER_TIMEOUT: Duration = Duration::from_secs(20);
@@ -112,11 +114,12 @@ struct Launcher {
     shutdown: Shutdown,
     points: Subscription<msg::DecisionPoint>,
     status: Subscription<msg::GuidanceStatus>,
+    results: Subscription<msg::TaskResult>,
     summary: Subscription<msg::RequestSummary>,
     diagnostics: Subscription<DiagnosticArray>,
     model: Model,
     horizon: Tick,
-    next_task: u64,
+    log: TaskLog,
     last_summary: Option<msg::RequestSummary>,
     paced: bool,
 }
@@ -135,11 +138,12 @@ impl Launcher {
             shutdown: Shutdown::on_signals(node.signal())?,
             points: node.subscription(&graph::DECISION_POINT)?,
             status: node.subscription(&graph::GUIDANCE_STATUS)?,
+            results: node.subscription(&graph::TASK_RESULTS)?,
             summary: node.subscription(&graph::REQUEST_SUMMARY)?,
             diagnostics: node.subscription(&graph::DIAGNOSTICS)?,
             horizon: mission.horizon(&model),
             model,
-            next_task: 0,
+            log: TaskLog::default(),
             last_summary: None,
             paced: mission.pace > 0.0,
             node,
@@ -147,7 +151,6 @@ impl Launcher {
     }
 
     fn watch(&mut self, fleet: &mut Fleet, output: &mut OutputFolder) -> Result<Flown> {
-        let mut totals = Totals::default();
         let mut progress = Progress::new(self.horizon, self.model.period);
         let mut started = None;
         let mut last_news = Instant::now();
@@ -160,13 +163,14 @@ impl Launcher {
                 last_news = Instant::now();
                 let began = *started.get_or_insert(last_news);
                 if let Some(result) = point.result.first() {
-                    self.take_result(result, output, &mut totals)?;
+                    self.log.flown(task_record(result)?, &result.strip_name);
                 }
-                progress.task(Tick(point.tick), &totals);
+                progress.task(Tick(point.tick), self.log.totals());
                 if point.mission_over {
                     progress.finish();
-                    self.wait_for_summary(Tick(point.tick))?;
-                    return Ok(Flown { end: Tick(point.tick), wall: last_news - began, totals });
+                    self.wait_for_the_ground(Tick(point.tick), output)?;
+                    let (end, wall, totals) = (Tick(point.tick), last_news - began, *self.log.totals());
+                    return Ok(Flown { end, wall, totals });
                 }
             }
             while let Some(status) = self.status.take()? {
@@ -175,9 +179,9 @@ impl Launcher {
                     msg::WheelTorque::PHASE_IMAGING => "imaging",
                     _ => "waiting",
                 };
-                progress.status(Tick(status.tick), phase, &status.strip_name, status.attitude_error, &totals);
+                progress.status(Tick(status.tick), phase, &status.strip_name, status.attitude_error, self.log.totals());
             }
-            self.take_rest()?;
+            self.take_rest(output)?;
             fleet.check()?;
             if !self.paced && last_news.elapsed() > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
@@ -186,19 +190,13 @@ impl Launcher {
         }
     }
 
-    /// Takes a result once: guidance asks again when an answer is late.
-    fn take_result(&mut self, result: &msg::TaskResult, output: &mut OutputFolder, totals: &mut Totals) -> Result<()> {
-        if result.task < self.next_task {
-            return Ok(());
+    fn take_rest(&mut self, output: &mut OutputFolder) -> Result<()> {
+        while let Some(result) = self.results.take()? {
+            self.log.settled(result.task, result.reward);
         }
-        self.next_task = result.task + 1;
-        let record = task_record(result)?;
-        totals.add(&record);
-        let name = record.strip.map(|_| result.strip_name.as_str());
-        output.write_task(&TaskLine::new(&record, name)).context("cannot write tasks.jsonl")
-    }
-
-    fn take_rest(&mut self) -> Result<()> {
+        for (_, line) in self.log.take() {
+            output.write_task(&line).context("cannot write tasks.jsonl")?;
+        }
         while let Some(summary) = self.summary.take()? {
             self.last_summary = Some(summary);
         }
@@ -210,13 +208,19 @@ impl Launcher {
         Ok(())
     }
 
-    fn wait_for_summary(&mut self, end: Tick) -> Result<()> {
+    /// Waits for the last rewards and the last summary of the request manager.
+    fn wait_for_the_ground(&mut self, end: Tick, output: &mut OutputFolder) -> Result<()> {
         let deadline = Instant::now() + SUMMARY_TIMEOUT;
-        while self.last_summary.as_ref().is_none_or(|summary| summary.tick < end.0) && Instant::now() < deadline {
-            self.take_rest()?;
+        let behind = |it: &Self| it.last_summary.as_ref().is_none_or(|summary| summary.tick < end.0) || it.log.waits();
+        while behind(self) && Instant::now() < deadline {
+            self.take_rest(output)?;
             self.node.wait(WAIT)?;
         }
-        Ok(())
+        if self.log.waits() {
+            tracing::warn!("the request manager has not settled every task: its rewards count as 0");
+            self.log.give_up();
+        }
+        self.take_rest(output)
     }
 
     fn accepted(&self) -> u64 {

@@ -10,8 +10,8 @@ use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use super::messages;
+use super::outgoing::Outgoing;
 use super::store::Store;
-use super::wiring::{Outgoing, each};
 use swath_mission::requests::logic::RequestLogic;
 use swath_mission::requests::query::page_length;
 use swath_mission::requests::refusal::{BATCH_MAX, Refusal, check_batch};
@@ -150,7 +150,7 @@ impl Desk {
             Outgoing::Reviewed(id, response) => self.review.respond(id, response)?,
             Outgoing::Get(id, call) => self.get.respond(id, get(logic, base, store, &call)?)?,
             Outgoing::History(id, call) => self.history.respond(id, history(base, store, &call)?)?,
-            Outgoing::Offer(_) | Outgoing::News(_) | Outgoing::Summary => {}
+            Outgoing::Offer(_) | Outgoing::Result(_) | Outgoing::News(_) | Outgoing::Summary => {}
         }
         Ok(())
     }
@@ -260,4 +260,15 @@ fn history(base: &MissionNode, store: &Store, call: &msg::ListHistoryRequest) ->
     lines.truncate(limit);
     let entries = lines.iter().map(|line| messages::history_entry(&base.stamper, line)).collect::<Vec<_>>();
     Ok(msg::ListHistoryResponse { entries, more, ..Default::default() })
+}
+
+/// Does something with each entry of a call: its results, and why the call as a whole is refused.
+fn each<T>(
+    entries: &[T],
+    mut apply: impl FnMut(&T) -> Result<StripId, Refusal>,
+) -> (Vec<msg::SubmitResult>, u16, String) {
+    match check_batch(entries.len()) {
+        Ok(()) => (entries.iter().map(|entry| messages::submit_result(apply(entry))).collect(), 0, String::new()),
+        Err(refusal) => (Vec::new(), refusal.code(), refusal.to_string()),
+    }
 }

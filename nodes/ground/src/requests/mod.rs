@@ -2,6 +2,7 @@
 
 mod desk;
 pub mod messages;
+mod outgoing;
 pub mod store;
 pub mod wiring;
 pub mod writer;

@@ -254,9 +254,8 @@ impl Trial {
         let task = self.simple.task;
         let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_elevation: 0.5 };
         let (start, end) = (Tick(task * 300), Tick(task * 300 + 300));
-        let reward = if failure.is_none() { 0.5 } else { 0.0 };
         let strip = Some(StripId(i as u64 + 1));
-        let record = TaskRecord { task, start, end, strip, t_pre: 100, t_acq: 200, outcome, reward };
+        let record = TaskRecord { task, start, end, strip, t_pre: 100, t_acq: 200, outcome };
         self.simple.end(failure);
         self.logic.on_decision_point(task + 1, end, std::slice::from_ref(&record));
         self.last = Some(record);
@@ -266,7 +265,7 @@ impl Trial {
         self.store = Store::open(&self.folder.path().join("store.sqlite"), "trial").unwrap();
         let snapshot = self.store.snapshot().unwrap();
         let mut logic = empty();
-        logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress).unwrap();
+        logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled).unwrap();
         self.logic = logic;
     }
 

@@ -78,6 +78,8 @@ pub struct Snapshot {
     pub rejected: usize,
     /// How far the mission has come.
     pub progress: Progress,
+    /// The imaging task that was settled last, with its reward.
+    pub last_settled: Option<(u64, f64)>,
 }
 
 /// A change as the audit trail has it.
@@ -255,7 +257,14 @@ impl Store {
             requests,
             rejected: usize::try_from(rejected).unwrap_or(0),
             progress: progress.unwrap_or_default(),
+            last_settled: self.last_settled().map_err(sql)?,
         })
+    }
+
+    fn last_settled(&self) -> rusqlite::Result<Option<(u64, f64)>> {
+        let select = "SELECT task, reward FROM attempts ORDER BY task DESC LIMIT 1";
+        let read = |row: &Row<'_>| Ok((row.get::<_, i64>(0)?.cast_unsigned(), row.get(1)?));
+        self.connection.query_row(select, [], read).optional()
     }
 
     fn progress(&self) -> rusqlite::Result<Option<Progress>> {

@@ -57,9 +57,8 @@ fn busy(store: &mut Store) -> RequestLogic {
     for (task, id, failure) in [(0, accepted[5], None), (1, accepted[8], Some(FailureReason::Elevation))] {
         let start = Tick(task * 300);
         logic.on_task(InFlight { task, id, start, t_pre: 100, t_acq: 200 });
-        let reward = if failure.is_none() { 0.4 } else { 0.0 };
         let (strip, outcome) = (Some(id), outcome(failure));
-        let record = TaskRecord { task, start, end: start.after(300), strip, t_pre: 100, t_acq: 200, outcome, reward };
+        let record = TaskRecord { task, start, end: start.after(300), strip, t_pre: 100, t_acq: 200, outcome };
         logic.on_decision_point(task + 1, record.end, std::slice::from_ref(&record));
     }
     logic.on_task(InFlight { task: 2, id: accepted[11], start: Tick(600), t_pre: 100, t_acq: 200 });
@@ -78,7 +77,7 @@ fn a_request_manager_that_is_restored_is_the_same_one() {
     let snapshot = store.snapshot().unwrap();
     assert!(snapshot.begun);
     let mut after = empty();
-    after.restore(snapshot.requests, snapshot.rejected, snapshot.progress).unwrap();
+    after.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled).unwrap();
     assert_eq!((after.len(), after.progress(), after.reward()), (before.len(), before.progress(), before.reward()));
     for id in (1..=before.len() as u64).map(StripId) {
         assert_eq!(after.request(id), before.request(id), "{id:?}");

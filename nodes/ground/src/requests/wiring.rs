@@ -8,18 +8,18 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::{situation, task_record};
-use swath_ros::{Publisher, RequestId, Spec, Subscription, graph};
+use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use super::desk::Desk;
 use super::messages;
+use super::outgoing::Outgoing;
 use super::store::{Durability, Store};
 use super::writer::Writer;
 use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
-use swath_mission::requests::refusal::{Refusal, check_batch};
 use swath_node::node::{MissionNode, Severity};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
@@ -42,34 +42,6 @@ pub fn run() -> Result<()> {
     outcome
 }
 
-/// What goes out once a batch of the journal is written.
-pub(super) enum Outgoing {
-    /// The candidates of a task.
-    Offer(Box<msg::UpcomingStrips>),
-    /// Changes.
-    News(Arc<Vec<Entry>>),
-    /// How many requests stand where, when the mission is over.
-    Summary,
-    /// Answers of the services.
-    Submitted(RequestId, msg::SubmitStripsResponse),
-    Cancelled(RequestId, msg::CancelStripsResponse),
-    Replaced(RequestId, msg::ReplaceStripResponse),
-    Reviewed(RequestId, msg::ReviewStripsResponse),
-    /// Questions that are answered from the store.
-    Get(RequestId, msg::GetStripRequest),
-    History(RequestId, msg::ListHistoryRequest),
-}
-
-impl Outgoing {
-    /// Answers promise more than the mission's own bookkeeping.
-    fn durability(&self) -> Durability {
-        match self {
-            Self::Submitted(..) | Self::Cancelled(..) | Self::Replaced(..) | Self::Reviewed(..) => Durability::Machine,
-            _ => Durability::Process,
-        }
-    }
-}
-
 struct RequestNode {
     logic: RequestLogic,
     desk: Desk,
@@ -79,6 +51,9 @@ struct RequestNode {
     requests: Subscription<msg::StripRequest>,
     upcoming: Publisher<msg::UpcomingStrips>,
     events: Publisher<msg::StripStatus>,
+    results: Publisher<msg::TaskResult>,
+    /// Tasks below this number have been told of.
+    told: u64,
     summary: Publisher<msg::RequestSummary>,
     aborts: Publisher<msg::TaskAbort>,
     last: Option<msg::UpcomingStrips>,
@@ -117,6 +92,8 @@ impl RequestNode {
             requests: base.node.subscription(&graph::STRIP_REQUEST)?,
             upcoming: base.node.publisher(&graph::UPCOMING_STRIPS)?,
             events: base.node.publisher(&graph::STRIP_EVENTS)?,
+            results: base.node.publisher(&graph::TASK_RESULTS)?,
+            told: 0,
             summary: base.node.publisher(&graph::REQUEST_SUMMARY)?,
             aborts: base.node.publisher(&graph::TASK_ABORT)?,
             last: None,
@@ -141,7 +118,9 @@ impl RequestNode {
     fn turn(&mut self) -> Result<()> {
         let mut outgoing = Vec::new();
         while let Some(point) = self.points.take()? {
-            outgoing.extend(self.offer(&point)?.map(|offer| Outgoing::Offer(Box::new(offer))));
+            let offer = self.offer(&point)?;
+            outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
+            outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
             if point.mission_over {
                 outgoing.push(Outgoing::Summary);
             }
@@ -203,6 +182,19 @@ impl RequestNode {
         Ok((!point.mission_over).then_some(message))
     }
 
+    /// The tasks that nobody was told of yet, with their rewards.
+    fn results(&mut self, point: &msg::DecisionPoint) -> Vec<msg::TaskResult> {
+        let told = self.told;
+        let ended = point.last_imaging.iter().chain(&point.result);
+        let mut results: Vec<_> = ended.filter(|result| result.task >= told).cloned().collect();
+        results.dedup_by_key(|result| result.task);
+        for result in &mut results {
+            result.reward = self.logic.reward_of(result.task);
+            self.told = self.told.max(result.task + 1);
+        }
+        results
+    }
+
     /// Gives the journal to the writer, and lets what goes out wait for it.
     fn hand_over(&mut self, outgoing: Vec<Outgoing>) {
         let entries = Arc::new(self.logic.take_journal());
@@ -231,6 +223,7 @@ impl RequestNode {
                     }
                     self.tell_summary()?;
                 }
+                Outgoing::Result(result) => self.results.publish(&result)?,
                 Outgoing::Summary => self.tell_summary()?,
                 // Before the mission begins nobody may be listening yet.
                 Outgoing::News(entries) if self.last.is_none() => self.unheard.push(entries),
@@ -276,7 +269,7 @@ fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
         RequestLogic::new((*base.model).clone(), &base.mission.initial(), base.horizon, base.mission.rules());
     if snapshot.begun {
         let (count, at) = (snapshot.requests.len(), snapshot.progress.now);
-        logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress)?;
+        logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled)?;
         tracing::info!("{count} requests are taken up from {}, at {at}", store.path().display());
         return Ok(logic);
     }
@@ -285,15 +278,4 @@ fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
     let accepted = requests.into_iter().filter_map(|request| logic.submit(request).ok()).count();
     tracing::info!("{accepted} of the {total} strips known from the start are accepted");
     Ok(logic)
-}
-
-/// Does something with each entry of a call: its results, and why the call as a whole is refused.
-pub(super) fn each<T>(
-    entries: &[T],
-    mut apply: impl FnMut(&T) -> Result<StripId, Refusal>,
-) -> (Vec<msg::SubmitResult>, u16, String) {
-    match check_batch(entries.len()) {
-        Ok(()) => (entries.iter().map(|entry| messages::submit_result(apply(entry))).collect(), 0, String::new()),
-        Err(refusal) => (Vec::new(), refusal.code(), refusal.to_string()),
-    }
 }

@@ -18,11 +18,11 @@ const SAME_PLACE_PER_DEG: f64 = 1e5;
 pub(super) type Place = [i32; 4];
 
 impl RequestLogic {
-    /// A request's strip one way or both, checked but not taken.
+    /// A request's strip one way or both, checked at a tick but not taken.
     ///
     /// # Errors
     /// Why it would be refused.
-    pub(super) fn prepare(&self, named: &NamedRequest) -> Result<Vec<(StripRequest, Prepared)>, Refusal> {
+    pub(super) fn prepare(&self, named: &NamedRequest, at: Tick) -> Result<Vec<(StripRequest, Prepared)>, Refusal> {
         check_text("name", &named.name)?;
         check_text("client_ref", &named.client_ref)?;
         check_text("submitter", &named.submitter)?;
@@ -32,9 +32,9 @@ impl RequestLogic {
         let request = &named.request;
         // What is wrong with the strip itself comes before when it may be imaged.
         request.to_strip(&self.model.config.requests, self.model.config.earth.radius_m)?;
-        let validity = self.validity(named)?;
+        let validity = self.validity(named, at)?;
         let prepare = |request: StripRequest| {
-            let prepared = self.catalogue.prepare(&self.model, &request, validity, self.now())?;
+            let prepared = self.catalogue.prepare(&self.model, &request, validity, at)?;
             Ok::<_, StripError>((request, prepared))
         };
         if !request.bidirectional {
@@ -47,7 +47,7 @@ impl RequestLogic {
         }
     }
 
-    fn validity(&self, named: &NamedRequest) -> Result<Validity, Refusal> {
+    fn validity(&self, named: &NamedRequest, at: Tick) -> Result<Validity, Refusal> {
         let period_ns = self.model.period.nanoseconds();
         let epoch_ns = self.rules.epoch_ns;
         let since_epoch = |ns: u64| (ns as f64 - epoch_ns as f64) * 1e-9;
@@ -60,14 +60,19 @@ impl RequestLogic {
             return Err(Refusal::ValidityOrder { from_s: since_epoch(from_ns), until_s: since_epoch(until_ns) });
         }
         let until = Tick(until_ns.saturating_sub(epoch_ns) / period_ns);
-        if until_ns < epoch_ns || until <= self.now() {
-            let now_s = self.model.period.time_s(self.now());
+        if until_ns < epoch_ns || until <= at {
+            let now_s = self.model.period.time_s(at);
             return Err(Refusal::ValidityOver { until_s: since_epoch(until_ns), now_s });
         }
         Ok(Validity { from, until: Some(until) })
     }
 
-    pub(super) fn take_in(&mut self, named: &NamedRequest, replaces: Option<StripId>) -> Result<StripId, Refusal> {
+    pub(super) fn take_in(
+        &mut self,
+        named: &NamedRequest,
+        replaces: Option<StripId>,
+        at: Tick,
+    ) -> Result<StripId, Refusal> {
         if let Some(id) = self.by_reference(&named.submitter, &named.client_ref).filter(|&id| Some(id) != replaces) {
             return if same_order(&self.requests[id.0 as usize - 1].named, named) {
                 Ok(id)
@@ -79,7 +84,7 @@ impl RequestLogic {
         if self.requests.len() + 1 >= CAPACITY {
             return Err(Refusal::Capacity { count: self.requests.len() });
         }
-        let ways = self.prepare(named)?;
+        let ways = self.prepare(named, at)?;
         self.check_same_strip(named, replaces)?;
         let state = State::Received.step(if named.hold_for_approval { State::Held } else { State::Accepted });
         let state = state.map_err(|illegal| Refusal::State { id: 0, illegal })?;
@@ -88,7 +93,17 @@ impl RequestLogic {
         for (id, (request, prepared)) in (first.0..).map(StripId).zip(ways) {
             let named = NamedRequest { request, ..named.clone() };
             let linked = if id == first { twin } else { Some(first) };
-            self.add(id, named, prepared, linked, replaces, state);
+            let request = Request {
+                actor: named.submitter.clone(),
+                named,
+                state,
+                reason: (0, String::new()),
+                created: at,
+                changed: at,
+                standing: Standing::default(),
+                supersedes: replaces,
+            };
+            self.add(id, request, prepared, linked);
         }
         if let Some(twin) = twin {
             self.catalogue.link(first, twin);
@@ -96,38 +111,18 @@ impl RequestLogic {
         Ok(first)
     }
 
-    fn add(
-        &mut self,
-        id: StripId,
-        named: NamedRequest,
-        prepared: Prepared,
-        linked: Option<StripId>,
-        supersedes: Option<StripId>,
-        state: State,
-    ) {
-        let tick = self.now();
-        let windows = prepared.windows.clone();
+    fn add(&mut self, id: StripId, request: Request, prepared: Prepared, linked: Option<StripId>) {
         self.journal.push(Entry::Added(Box::new(Added {
             id,
-            named: named.clone(),
-            windows,
-            tick,
+            named: request.named.clone(),
+            windows: prepared.windows.clone(),
+            tick: request.created,
             linked,
-            supersedes,
+            supersedes: request.supersedes,
         })));
-        let actor = named.submitter.clone();
-        let request = Request {
-            named,
-            state,
-            reason: (0, String::new()),
-            actor,
-            created: tick,
-            changed: tick,
-            standing: Standing::default(),
-            supersedes,
-        };
+        let held = request.state == State::Held;
         self.insert(prepared, request);
-        if state == State::Held {
+        if held {
             self.catalogue.hold(id);
         }
         self.note(id);
@@ -177,7 +172,7 @@ impl RequestLogic {
         }
     }
 
-    pub(super) fn note_refusal(&mut self, named: NamedRequest, refusal: &Refusal) {
+    pub(super) fn note_refusal(&mut self, named: NamedRequest, refusal: &Refusal, at: Tick) {
         self.rejected += 1;
         let clip = |text: String| if text.len() <= TEXT_MAX { text } else { text.chars().take(TEXT_MAX).collect() };
         let named = NamedRequest {
@@ -191,7 +186,7 @@ impl RequestLogic {
             state: State::Rejected,
             reason: (refusal.code(), refusal.to_string()),
             actor: SYSTEM.to_owned(),
-            tick: self.now(),
+            tick: at,
             standing: Standing::default(),
             refused: Some(Box::new(named)),
         }));

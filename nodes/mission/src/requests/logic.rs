@@ -122,6 +122,8 @@ pub struct RequestLogic {
     pub(super) progress: Progress,
     /// Number of the last task that was wanted.
     wanted: u64,
+    /// The imaging task that was settled last, with its reward.
+    pub(super) last_settled: Option<(u64, f64)>,
     pub(super) journal: Vec<Entry>,
     pub(super) aborts: Vec<Abort>,
 }
@@ -146,19 +148,27 @@ impl RequestLogic {
             reward: 0.0,
             progress: Progress::default(),
             wanted: 0,
+            last_settled: None,
             journal: Vec::new(),
             aborts: Vec::new(),
         }
     }
 
     /// Takes up what the store has: requests in the order of their numbers, how many were refused, how far the mission
-    /// has come.
+    /// has come, the imaging task that was settled last with its reward.
     ///
     /// # Errors
     /// When a stored request is no strip: it was stored for a mission with other limits.
-    pub fn restore(&mut self, stored: Vec<Stored>, rejected: usize, progress: Progress) -> Result<(), Refusal> {
+    pub fn restore(
+        &mut self,
+        stored: Vec<Stored>,
+        rejected: usize,
+        progress: Progress,
+        last_settled: Option<(u64, f64)>,
+    ) -> Result<(), Refusal> {
         self.rejected = rejected;
         self.progress = progress;
+        self.last_settled = last_settled;
         let links: Vec<_> = stored.iter().map(|stored| stored.linked).collect();
         for Stored { request, windows, .. } in stored {
             let strip =
@@ -184,26 +194,24 @@ impl RequestLogic {
         Ok(())
     }
 
-    /// Takes a request. The same one again under the same reference of the same submitter gets the number that it has.
+    /// Takes a request now. The same one again under the same reference of the same submitter gets the number that it
+    /// has.
     ///
     /// # Errors
     /// Why it is refused.
     pub fn submit(&mut self, named: NamedRequest) -> Result<StripId, Refusal> {
-        let result = self.take_in(&named, None);
-        if let Err(refusal) = &result {
-            self.note_refusal(named, refusal);
-        }
-        result
+        self.submit_at(named, self.now())
     }
 
-    /// As [`Self::submit`], for a request that came at an earlier tick: its windows are sought from there.
+    /// As [`Self::submit`], for a request that came at a tick: its windows are sought from there.
     ///
     /// # Errors
     /// Why it is refused.
-    pub fn submit_since(&mut self, named: NamedRequest, since: Tick) -> Result<StripId, Refusal> {
-        let now = std::mem::replace(&mut self.progress.now, since);
-        let result = self.submit(named);
-        self.progress.now = now;
+    pub fn submit_at(&mut self, named: NamedRequest, at: Tick) -> Result<StripId, Refusal> {
+        let result = self.take_in(&named, None, at);
+        if let Err(refusal) = &result {
+            self.note_refusal(named, refusal, at);
+        }
         result
     }
 
@@ -218,11 +226,12 @@ impl RequestLogic {
         {
             return Ok(new);
         }
-        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old)));
+        let now = self.now();
+        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old), now));
         let new = match result {
             Ok(new) => new,
             Err(refusal) => {
-                self.note_refusal(named, &refusal);
+                self.note_refusal(named, &refusal, now);
                 return Err(refusal);
             }
         };
@@ -287,10 +296,7 @@ impl RequestLogic {
         self.progress.now = self.progress.now.max(now);
         self.wanted = self.wanted.max(task);
         for record in results {
-            if record.strip.is_some() && record.task >= self.progress.settled {
-                self.progress.settled = record.task + 1;
-                self.settle(record);
-            }
+            self.on_result(record);
         }
         if let Some(flown) = self.progress.in_flight.filter(|flown| flown.task < task) {
             self.progress.in_flight = None;
@@ -310,6 +316,22 @@ impl RequestLogic {
             pending: self.catalogue.pending(),
             fulfilled: self.count(State::Completed),
         }
+    }
+
+    /// A task has ended; one that is known changes nothing. Returns its reward.
+    pub fn on_result(&mut self, record: &TaskRecord) -> f64 {
+        self.progress.now = self.progress.now.max(record.end);
+        if record.strip.is_some() && record.task >= self.progress.settled {
+            self.progress.settled = record.task + 1;
+            self.last_settled = Some((record.task, self.settle(record)));
+        }
+        self.reward_of(record.task)
+    }
+
+    /// Reward of a task, if it is the imaging task that was settled last; else 0.
+    #[must_use]
+    pub fn reward_of(&self, task: u64) -> f64 {
+        self.last_settled.filter(|(settled, _)| *settled == task).map_or(0.0, |(_, reward)| reward)
     }
 
     /// What is known of the satellite at the last decision point; previews predict transitions from there.

@@ -122,7 +122,7 @@ impl RequestLogic {
     /// # Errors
     /// Why it would be refused.
     pub fn preview(&self, named: &NamedRequest, until: Tick) -> Result<Vec<Opportunity>, Refusal> {
-        let ways = self.prepare(named)?;
+        let ways = self.prepare(named, self.now())?;
         Ok(ways.first().map_or(Vec::new(), |(_, prepared)| self.opportunities(prepared, until, None)))
     }
 

@@ -8,11 +8,12 @@ use super::lifecycle::State;
 use super::logic::{GUIDANCE, Request, RequestLogic, SYSTEM};
 
 impl RequestLogic {
-    /// A task that imaged, or should have imaged, a strip has ended.
-    pub(super) fn settle(&mut self, record: &TaskRecord) {
+    /// A task that imaged, or should have imaged, a strip has ended. Returns its reward.
+    pub(super) fn settle(&mut self, record: &TaskRecord) -> f64 {
         self.progress.in_flight = self.progress.in_flight.filter(|flown| flown.task > record.task);
-        let Some(id) = record.strip else { return };
-        let Some(request) = self.request_mut(id) else { return };
+        let Some(id) = record.strip else { return 0.0 };
+        let worth = self.catalogue.get(id).map_or(0.0, |entry| entry.strip.priority);
+        let Some(request) = self.request_mut(id) else { return 0.0 };
         request.standing.attempts += 1;
         request.standing.imaging = record.start.after(record.t_pre);
         let wanted = !request.state.is_final();
@@ -21,7 +22,7 @@ impl RequestLogic {
             None => Outcome::Succeeded,
             Some(failure) => Outcome::Failed(failure),
         };
-        let reward = if outcome == Outcome::Succeeded { record.reward } else { 0.0 };
+        let reward = if outcome == Outcome::Succeeded { worth } else { 0.0 };
         request.standing.reward += reward;
         self.reward += reward;
         self.journal.push(Entry::Attempted(Attempt {
@@ -41,6 +42,7 @@ impl RequestLogic {
             Outcome::Succeeded => self.imaged(id),
             Outcome::Failed(failure) => self.not_imaged(id, failure),
         }
+        reward
     }
 
     fn imaged(&mut self, id: StripId) {

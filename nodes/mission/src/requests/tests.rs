@@ -50,9 +50,8 @@ fn chosen(task: u64, id: StripId) -> InFlight {
 
 fn record(task: u64, id: StripId, failure: Option<FailureReason>) -> TaskRecord {
     let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_elevation: 0.5 };
-    let reward = if failure.is_none() { 0.5 } else { 0.0 };
     let (start, end) = (Tick(task * 300), Tick(task * 300 + 300));
-    TaskRecord { task, start, end, strip: Some(id), t_pre: 100, t_acq: 200, outcome, reward }
+    TaskRecord { task, start, end, strip: Some(id), t_pre: 100, t_acq: 200, outcome }
 }
 
 /// Chooses, images and reports a strip.

@@ -4,14 +4,14 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 use swath_sim::model::Model;
-use swath_sim::task::{Task, TaskOutcome, TaskRecord};
+use swath_sim::task::{Task, TaskRecord};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::executive::{Executive, Sight};
 use swath_sim::vehicle::flight::Situation;
-use swath_sim::vehicle::guidance::{Guidance, GuidanceTick};
+use swath_sim::vehicle::guidance::GuidanceTick;
+use swath_sim::vehicle::spacecraft::StateSample;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
-
-use swath_sim::vehicle::spacecraft::StateSample;
 
 /// A task as the planner gives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,8 +20,8 @@ pub struct TaskOrder {
     pub task: u64,
     /// What to do.
     pub kind: Task,
-    /// The strip and its name; `None` for a wait.
-    pub strip: Option<(StripId, String)>,
+    /// Name of its strip; empty for a wait.
+    pub name: String,
 }
 
 /// Why a task is not taken.
@@ -107,11 +107,14 @@ pub struct Command {
 #[derive(Clone, Debug)]
 pub struct GuidanceLogic {
     model: Model,
-    guidance: Guidance,
+    executive: Executive,
     horizon: Tick,
     hold: u32,
+    /// Time from a situation to the start of the task decided on it [ticks].
+    planning_delay: u32,
     task: u64,
-    active: Option<Active>,
+    /// Name of the strip in hand.
+    name: String,
     /// The state at which a task is wanted, then states that came meanwhile.
     waiting: VecDeque<StateSample>,
     latest: Option<Command>,
@@ -123,24 +126,19 @@ pub struct GuidanceLogic {
     pub late: u64,
 }
 
-#[derive(Clone, Debug)]
-struct Active {
-    order: TaskOrder,
-    start: Tick,
-}
-
 impl GuidanceLogic {
     /// Guidance at the epoch of a mission that ends at `horizon`; without a task in time the attitude is held for `hold`
     /// ticks.
     #[must_use]
     pub fn new(model: Model, horizon: Tick, hold: u32) -> Self {
         Self {
-            guidance: Guidance::new(&model),
+            executive: Executive::new(&model),
             model,
             horizon,
             hold: hold.max(1),
+            planning_delay: 0,
             task: 0,
-            active: None,
+            name: String::new(),
             waiting: VecDeque::new(),
             latest: None,
             torque_pending: Vector3::zeros(),
@@ -158,8 +156,15 @@ impl GuidanceLogic {
 
     /// Number and name of the strip in hand.
     #[must_use]
-    pub fn strip(&self) -> Option<&(StripId, String)> {
-        self.active.as_ref()?.order.strip.as_ref()
+    pub fn strip(&self) -> Option<(StripId, &str)> {
+        Some((self.executive.task()?.0.strip()?, &self.name))
+    }
+
+    /// From now on this much time passes between a situation and the start of the task decided on it [ticks].
+    #[must_use]
+    pub fn with_planning_delay(mut self, ticks: u32) -> Self {
+        self.planning_delay = ticks;
+        self
     }
 
     /// Takes a state. A state seen before brings its command again, so that a lost sample stops nothing.
@@ -196,7 +201,7 @@ impl GuidanceLogic {
                 return Err(TaskError::TransitionTooLong { task, t_pre, max });
             }
         }
-        Ok(self.begin(order))
+        Ok(self.begin(order, self.planning_delay))
     }
 
     /// The task wanted has not come in time: holds the attitude for a while, then asks again.
@@ -205,13 +210,13 @@ impl GuidanceLogic {
             return Vec::new();
         }
         self.late += 1;
-        self.begin(TaskOrder { task: self.task, kind: Task::Wait { ticks: self.hold }, strip: None })
+        self.begin(TaskOrder { task: self.task, kind: Task::Wait { ticks: self.hold }, name: String::new() }, 0)
     }
 
     /// A task is no longer wanted: it ends at the next state, unless imaging has begun. Returns whether it ends.
     pub fn on_abort(&mut self, task: u64) -> bool {
-        let slewing = match (&self.active, &self.latest) {
-            (Some(active), Some(latest)) => active.order.task == task && !latest.guidance.imaging,
+        let slewing = match (self.executive.number(), &self.latest) {
+            (Some(number), Some(latest)) => number == task && !latest.guidance.imaging,
             _ => false,
         };
         if slewing {
@@ -220,11 +225,11 @@ impl GuidanceLogic {
         slewing
     }
 
-    fn begin(&mut self, order: TaskOrder) -> Vec<Effect> {
+    fn begin(&mut self, order: TaskOrder, delay: u32) -> Vec<Effect> {
         let mut states = std::mem::take(&mut self.waiting);
         let Some(state) = states.pop_front() else { return Vec::new() };
-        self.guidance.start(order.kind, state.tick, &state.body);
-        self.active = Some(Active { order, start: state.tick });
+        self.executive.begin(order.task, order.kind, delay, &sight(&state));
+        self.name = order.name;
         let mut effects = vec![self.fly(&state)];
         for state in states {
             effects.extend(self.on_state(state));
@@ -234,10 +239,10 @@ impl GuidanceLogic {
 
     fn process(&mut self, state: StateSample) -> Vec<Effect> {
         let aborted = self.aborted.take().is_some_and(|task| self.may_end(task, &state));
-        let ended = aborted || self.guidance.end().is_some_and(|end| state.tick >= end);
+        let ended = aborted || self.executive.end().is_some_and(|end| state.tick >= end);
         let over = state.tick >= self.horizon;
         let finished = if ended || over { self.finish(&state) } else { None };
-        if self.active.is_some() {
+        if self.executive.task().is_some() {
             return vec![self.fly(&state)];
         }
         let situation = Situation {
@@ -245,7 +250,7 @@ impl GuidanceLogic {
             r_BN_N: state.r_BN_N,
             v_BN_N: state.v_BN_N,
             body: state.body,
-            servo_integral: self.guidance.servo_integral,
+            servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
         };
         if !over {
@@ -262,25 +267,19 @@ impl GuidanceLogic {
     }
 
     /// Whether a task is in hand whose imaging has not begun at a state.
-    fn may_end(&self, task: u64, state: &StateSample) -> bool {
-        self.active.as_ref().is_some_and(|active| match active.order.kind {
-            Task::Image { t_pre, .. } => active.order.task == task && state.tick < active.start.after(t_pre),
-            Task::Wait { .. } => false,
-        })
+    fn may_end(&self, number: u64, state: &StateSample) -> bool {
+        match self.executive.task() {
+            Some((Task::Image { t_pre, .. }, start)) => {
+                self.executive.number() == Some(number) && state.tick < start.after(*t_pre)
+            }
+            _ => false,
+        }
     }
 
     fn finish(&mut self, state: &StateSample) -> Option<FinishedTask> {
-        let Active { order, start } = self.active.take()?;
-        let outcome = self.guidance.finish(state.tick, &state.r_BN_N, &state.body).unwrap_or(TaskOutcome::NOT_BEGUN);
-        let (t_pre, t_acq, priority) = match order.kind {
-            Task::Image { strip, t_pre, t_acq } => (t_pre, t_acq, strip.priority),
-            Task::Wait { .. } => (0, 0, 0.0),
-        };
-        let (strip, name) = order.strip.map_or((None, String::new()), |(id, name)| (Some(id), name));
-        let reward = if strip.is_some() && outcome.failure.is_none() { priority } else { 0.0 };
-        let record = TaskRecord { task: order.task, start, end: state.tick, strip, t_pre, t_acq, outcome, reward };
+        let record = self.executive.finish(&sight(state))?;
         self.task += 1;
-        let finished = FinishedTask { record, name };
+        let finished = FinishedTask { record, name: std::mem::take(&mut self.name) };
         if finished.record.strip.is_some() {
             self.last_imaging = Some(finished.clone());
         }
@@ -288,14 +287,15 @@ impl GuidanceLogic {
     }
 
     fn fly(&mut self, state: &StateSample) -> Effect {
-        let guidance = self.guidance.tick(state.tick, &state.r_BN_N, &state.body);
+        let guidance = self.executive.tick(&sight(state));
         self.torque_pending = guidance.torque;
-        let (has_strip, remaining) = match &self.active {
-            Some(Active { order: TaskOrder { kind: Task::Image { t_pre, t_acq, .. }, .. }, start }) => {
-                let flown = state.tick.since(*start) as u32;
-                (true, if flown < *t_pre { t_pre - flown } else { (t_pre + t_acq).saturating_sub(flown) })
+        let left = |until: Tick| until.since(state.tick).max(0) as u32;
+        let (has_strip, remaining) = match self.executive.task() {
+            Some((Task::Image { t_pre, t_acq, .. }, start)) => {
+                let imaging = start.after(*t_pre);
+                (true, left(if state.tick < imaging { imaging } else { imaging.after(*t_acq) }))
             }
-            Some(Active { order, start }) => (false, order.kind.ticks() - state.tick.since(*start) as u32),
+            Some((task, start)) => (false, left(start.after(task.ticks()))),
             None => (false, 0),
         };
         let command = Command { tick: state.tick, task: self.task, guidance, has_strip, remaining };
@@ -304,15 +304,23 @@ impl GuidanceLogic {
     }
 }
 
+/// A state as the executive is told of it.
+fn sight(state: &StateSample) -> Sight<'_> {
+    Sight { now: state.tick, r_BN_N: state.r_BN_N, measured: &state.body, truth: state.truth.as_ref() }
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use swath_sim::config::SimConfig;
-    use swath_sim::learn::env::{Env, EpisodeConfig};
-    use swath_sim::planner::{Decision, Heuristic, Planner};
+    use swath_sim::learn::episode::{Env, EpisodeConfig};
+    use swath_sim::planner::{Heuristic, Planner};
     use swath_sim::rng;
+    use swath_sim::task::TaskOutcome;
+    use swath_sim::vehicle::errors::PlantErrors;
     use swath_sim::vehicle::initial::InitialState;
+    use swath_sim::vehicle::spacecraft::Spacecraft;
 
     use super::*;
     use crate::spacecraft::logic::SpacecraftLogic;
@@ -323,16 +331,32 @@ mod tests {
         Model::new(SimConfig::default()).unwrap()
     }
 
+    fn satellite(model: &Model) -> Spacecraft {
+        let initial = InitialState::draw(&model.config, &mut rng::stream(SEED, rng::INITIAL_STATE));
+        Spacecraft::new(model, &initial)
+    }
+
     /// Spacecraft and guidance as two nodes with two ticks under way, against the environment in one process.
     #[test]
     fn two_nodes_fly_what_the_environment_flies() {
+        for errors in ["none", "noise", "torque-10%,inertia+5%,noise,delay"] {
+            let flown = compare(&errors.parse().unwrap());
+            assert!(flown > 20, "{errors}: only {flown} tasks");
+        }
+    }
+
+    fn compare(errors: &PlantErrors) -> u64 {
         let model = model();
         let config = EpisodeConfig { orbits: 0.5, ..EpisodeConfig::evaluation() };
         let mut env = Env::episode(Arc::new(model.clone()), &config, SEED);
-        let initial = InitialState::draw(&model.config, &mut rng::stream(SEED, rng::INITIAL_STATE));
-        let mut spacecraft = SpacecraftLogic::new(&model, &initial, env.horizon());
-        let mut guidance = GuidanceLogic::new(model, env.horizon(), 20);
+        env.differ(errors, SEED).unwrap();
+        let mut satellite = satellite(&model);
+        satellite.differ(&model, errors, SEED).unwrap();
+        let mut spacecraft = SpacecraftLogic::new(satellite, env.horizon());
+        let delay = model.period.ticks_ceil(errors.planning_delay_s);
+        let mut guidance = GuidanceLogic::new(model, env.horizon(), 20).with_planning_delay(delay);
         let mut planner = Heuristic { t_pre_s: 60.0 };
+        let mut expected = None;
         let mut states = VecDeque::from([spacecraft.sample()]);
         let mut over = false;
         while !over {
@@ -350,44 +374,34 @@ mod tests {
                         over = point.mission_over;
                         let decision = planner.decide(&env.context()).unwrap();
                         assert_eq!(&point.situation, env.context().situation);
-                        if let Some(finished) = &point.finished {
-                            assert_eq!(finished.record.end, env.now());
-                        }
+                        assert_eq!(point.finished.as_ref().map(|finished| &finished.record), expected.as_ref());
                         if over {
                             break;
                         }
                         let kind = decision.to_task(&env.context()).unwrap();
-                        let strip = match decision {
-                            Decision::Image { candidate, .. } => {
-                                Some((env.context().candidates[candidate].id, "strip".to_owned()))
-                            }
-                            Decision::Wait { .. } => None,
-                        };
-                        let order = TaskOrder { task: point.task, kind, strip };
-                        let expected = env.step_to_horizon(decision).unwrap().record;
+                        let order = TaskOrder { task: point.task, kind, name: "strip".to_owned() };
+                        expected = Some(env.fly(decision, env.horizon()).unwrap().record);
                         effects.extend(guidance.on_task(order).unwrap());
-                        assert_eq!(expected.task, point.task);
                     }
                 }
             }
         }
         assert!(env.truncated());
-        assert!(guidance.task > 20, "only {} tasks", guidance.task);
         assert_eq!((spacecraft.missed, guidance.late), (0, 0));
+        guidance.task
     }
 
     #[test]
     fn a_late_task_is_replaced_by_holding_the_attitude() {
         let model = model();
-        let initial = InitialState::draw(&model.config, &mut rng::stream(SEED, rng::INITIAL_STATE));
-        let mut spacecraft = SpacecraftLogic::new(&model, &initial, Tick(100));
+        let mut spacecraft = SpacecraftLogic::new(satellite(&model), Tick(100));
         let mut guidance = GuidanceLogic::new(model, Tick(100), 10);
         assert!(matches!(guidance.on_state(spacecraft.sample())[..], [Effect::Decide(_)]));
         assert!(guidance.on_state(spacecraft.advance()).is_empty(), "the next state waits for the task");
         let effects = guidance.on_deadline();
         assert!(matches!(effects[..], [Effect::Command(_), Effect::Command(_)]));
         assert_eq!(guidance.late, 1);
-        let order = TaskOrder { task: 0, kind: Task::Wait { ticks: 5 }, strip: None };
+        let order = TaskOrder { task: 0, kind: Task::Wait { ticks: 5 }, name: String::new() };
         assert_eq!(guidance.on_task(order), Err(TaskError::NotWanted { task: 0, wanted: None }));
     }
 
@@ -396,13 +410,12 @@ mod tests {
         let model = model();
         let env = Env::episode(Arc::new(model.clone()), &EpisodeConfig::evaluation(), SEED);
         let candidate = env.context().candidates[0];
-        let initial = InitialState::draw(&model.config, &mut rng::stream(SEED, rng::INITIAL_STATE));
         for (ticks, given_up) in [(10, true), (60, false)] {
-            let mut spacecraft = SpacecraftLogic::new(&model, &initial, Tick(1000));
+            let mut spacecraft = SpacecraftLogic::new(satellite(&model), Tick(1000));
             let mut guidance = GuidanceLogic::new(model.clone(), Tick(1000), 10);
             guidance.on_state(spacecraft.sample());
-            let kind = Task::Image { strip: candidate.strip, t_pre: 40, t_acq: candidate.t_acq };
-            let order = TaskOrder { task: 0, kind, strip: Some((candidate.id, "strip".to_owned())) };
+            let kind = Task::Image { id: candidate.id, strip: candidate.strip, t_pre: 40, t_acq: candidate.t_acq };
+            let order = TaskOrder { task: 0, kind, name: "strip".to_owned() };
             guidance.on_task(order).unwrap();
             let mut sample = |guidance: &mut GuidanceLogic| {
                 let effects = guidance.on_state(spacecraft.advance());

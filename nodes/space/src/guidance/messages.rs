@@ -14,16 +14,16 @@ use super::logic::{Command, DecisionPoint, FinishedTask, TaskOrder};
 /// # Errors
 /// When its kind is unknown or its strip cannot be flown.
 pub fn task_order(model: &Model, message: &msg::ImagingTask) -> Result<TaskOrder, MessageError> {
-    let (kind, named) = match message.kind {
+    let (kind, name) = match message.kind {
         msg::ImagingTask::KIND_IMAGE => {
             let strip = acquisition(model, &message.strip, message.t_acq_ticks)?;
-            let kind = Task::Image { strip, t_pre: message.t_pre_ticks, t_acq: message.t_acq_ticks };
-            (kind, Some((StripId(message.strip.id), message.strip.name.clone())))
+            let (id, t_pre, t_acq) = (StripId(message.strip.id), message.t_pre_ticks, message.t_acq_ticks);
+            (Task::Image { id, strip, t_pre, t_acq }, message.strip.name.clone())
         }
-        msg::ImagingTask::KIND_WAIT => (Task::Wait { ticks: message.wait_ticks }, None),
+        msg::ImagingTask::KIND_WAIT => (Task::Wait { ticks: message.wait_ticks }, String::new()),
         value => return Err(MessageError::Constant { field: "kind", value }),
     };
-    Ok(TaskOrder { task: message.task, kind, strip: named })
+    Ok(TaskOrder { task: message.task, kind, name })
 }
 
 /// A torque command with the tracking error that it rests on.
@@ -99,7 +99,8 @@ pub fn task_result(finished: &FinishedTask) -> msg::TaskResult {
         },
         max_attitude_error: record.outcome.max_attitude_error,
         min_elevation: record.outcome.min_elevation,
-        reward: record.reward,
+        // Whoever keeps the requests settles it.
+        reward: 0.0,
     }
 }
 

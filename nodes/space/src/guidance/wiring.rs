@@ -1,11 +1,16 @@
 //! The guidance node's topics, deadlines and alarms.
 
+use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::state_sample;
 use swath_ros::{Publisher, Spec, Subscription, graph};
+
+use swath_sim::time::Tick;
+use swath_sim::vehicle::dynamics::BodyState;
+use swath_sim::vehicle::spacecraft::StateSample;
 
 use super::logic::{Command, Effect, GuidanceLogic};
 use super::messages;
@@ -34,6 +39,10 @@ pub fn run() -> Result<()> {
 struct GuidanceNode {
     logic: GuidanceLogic,
     states: Subscription<msg::SpacecraftState>,
+    /// There is one where the sensors are not exact.
+    truths: Option<Subscription<msg::SpacecraftState>>,
+    /// States that wait for the truth of their tick, and truths that wait for their states.
+    unpaired: (VecDeque<StateSample>, BTreeMap<Tick, BodyState>),
     tasks: Subscription<msg::ImagingTask>,
     torques: Publisher<msg::WheelTorque>,
     points: Publisher<msg::DecisionPoint>,
@@ -68,9 +77,15 @@ impl GuidanceNode {
             mission.planning_deadline_s
         };
         let hold = period.ticks_ceil(mission.hold_s);
+        let delay = period.ticks_ceil(mission.plant.planning_delay_s);
         Ok(Self {
-            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold),
+            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold).with_planning_delay(delay),
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
+            truths: match mission.plant.noisy() {
+                true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
+                false => None,
+            },
+            unpaired: Default::default(),
             tasks: base.node.subscription(&graph::PLANNER_TASK)?,
             torques: base.node.publisher(&graph::WHEEL_TORQUE)?,
             points: base.node.publisher(&graph::DECISION_POINT)?,
@@ -91,20 +106,40 @@ impl GuidanceNode {
                 tracing::info!("task {} is given up: {}", message.task, message.reason);
             }
         }
-        while let Some(message) = self.states.take()? {
-            match state_sample(&message) {
-                Ok(state) => {
-                    let effects = self.logic.on_state(state);
-                    self.carry_out(effects)?;
-                }
-                Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
-            }
-        }
+        self.take_states()?;
         while let Some(message) = self.tasks.take()? {
             self.take_task(&message)?;
         }
         let wait = self.mind_question()?;
         self.base.node.wait(wait)?;
+        Ok(())
+    }
+
+    fn take_states(&mut self) -> Result<()> {
+        while let Some(message) = self.truths.as_ref().map_or(Ok(None), Subscription::take)? {
+            match state_sample(&message) {
+                Ok(truth) => _ = self.unpaired.1.insert(truth.tick, truth.body),
+                Err(error) => self.base.alarm(Severity::Error, "truth refused", &error.to_string())?,
+            }
+        }
+        while let Some(message) = self.states.take()? {
+            match state_sample(&message) {
+                Ok(state) => self.unpaired.0.push_back(state),
+                Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
+            }
+        }
+        while let Some(mut state) = self.unpaired.0.pop_front() {
+            if self.truths.is_some() {
+                state.truth = self.unpaired.1.remove(&state.tick);
+                if state.truth.is_none() {
+                    self.unpaired.0.push_front(state);
+                    break;
+                }
+                self.unpaired.1.retain(|&tick, _| tick > state.tick);
+            }
+            let effects = self.logic.on_state(state);
+            self.carry_out(effects)?;
+        }
         Ok(())
     }
 
@@ -170,7 +205,7 @@ impl GuidanceNode {
             self.phases.publish(&messages::task_phase(&self.base.stamper, command, strip))?;
         }
         if command.tick.0.is_multiple_of(self.status_every) {
-            let strip = self.logic.strip().map(|(id, name)| (id.0, name.as_str()));
+            let strip = self.logic.strip().map(|(id, name)| (id.0, name));
             self.status.publish(&messages::guidance_status(&self.base.stamper, command, strip))?;
         }
         Ok(())

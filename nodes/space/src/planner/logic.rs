@@ -126,7 +126,7 @@ mod tests {
     use std::sync::Arc;
 
     use swath_sim::config::SimConfig;
-    use swath_sim::learn::env::{Env, EpisodeConfig};
+    use swath_sim::learn::episode::{Env, EpisodeConfig};
     use swath_sim::planner::{Heuristic, PlannerError};
 
     use super::*;

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
-use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::spacecraft::{Spacecraft, StateSample};
 use thiserror::Error;
 
@@ -41,10 +39,10 @@ pub struct SpacecraftLogic {
 }
 
 impl SpacecraftLogic {
-    /// A spacecraft at the epoch that stops at `horizon`.
+    /// A spacecraft that stops at `horizon`.
     #[must_use]
-    pub fn new(model: &Model, initial: &InitialState, horizon: Tick) -> Self {
-        Self { spacecraft: Spacecraft::new(model, initial), horizon, commands: BTreeMap::new(), missed: 0 }
+    pub fn new(spacecraft: Spacecraft, horizon: Tick) -> Self {
+        Self { spacecraft, horizon, commands: BTreeMap::new(), missed: 0 }
     }
 
     /// Simulated time.
@@ -61,14 +59,7 @@ impl SpacecraftLogic {
 
     /// What the spacecraft tells of itself now.
     pub fn sample(&mut self) -> StateSample {
-        let spacecraft = &mut self.spacecraft;
-        StateSample {
-            tick: spacecraft.now,
-            r_BN_N: spacecraft.orbit.position(spacecraft.now),
-            v_BN_N: spacecraft.orbit.velocity(spacecraft.now),
-            body: spacecraft.body,
-            torque_applied: spacecraft.torque_applied,
-        }
+        self.spacecraft.sample()
     }
 
     /// Takes the command computed from the state at `tick`; one that came too late is left out.
@@ -116,14 +107,16 @@ impl SpacecraftLogic {
 #[cfg(test)]
 mod tests {
     use swath_sim::config::SimConfig;
+    use swath_sim::model::Model;
     use swath_sim::rng;
+    use swath_sim::vehicle::initial::InitialState;
 
     use super::*;
 
     fn spacecraft() -> SpacecraftLogic {
         let model = Model::new(SimConfig::default()).unwrap();
         let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
-        SpacecraftLogic::new(&model, &initial, Tick(100))
+        SpacecraftLogic::new(Spacecraft::new(&model, &initial), Tick(100))
     }
 
     #[test]

@@ -41,9 +41,11 @@ struct SpacecraftNode {
     logic: SpacecraftLogic,
     clock: Publisher<Clock>,
     states: Publisher<SpacecraftState>,
+    /// There is one where the sensors are not exact.
+    truths: Option<Publisher<SpacecraftState>>,
     commands: Subscription<WheelTorque>,
     telemetry: Telemetry,
-    unanswered: VecDeque<SpacecraftState>,
+    unanswered: VecDeque<StateSample>,
     pace: f64,
     peers: Vec<String>,
     peer_timeout: Duration,
@@ -62,9 +64,13 @@ impl SpacecraftNode {
         let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
         parameters.check_given()?;
         Ok(Self {
-            logic: SpacecraftLogic::new(&base.model, &base.mission.initial(), base.horizon),
+            logic: SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon),
             clock: base.node.publisher(&graph::CLOCK)?,
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
+            truths: match base.mission.plant.noisy() {
+                true => Some(base.node.publisher(&graph::SPACECRAFT_TRUTH)?),
+                false => None,
+            },
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
             telemetry: Telemetry::new(&base)?,
             unanswered: VecDeque::new(),
@@ -152,22 +158,25 @@ impl SpacecraftNode {
 
     fn publish(&mut self, sample: &StateSample) -> Result<()> {
         self.base.set_now(sample.tick);
-        let state = spacecraft_state(&self.base.stamper, sample);
-        self.clock.publish(&Clock { clock: state.header.stamp })?;
-        self.states.publish(&state)?;
+        self.clock.publish(&Clock { clock: self.base.stamper.time(sample.tick) })?;
+        self.tell(sample)?;
         if self.unanswered.len() == IN_FLIGHT {
             self.unanswered.pop_front();
         }
-        self.unanswered.push_back(state);
+        self.unanswered.push_back(*sample);
         self.telemetry.publish(&self.base, sample)
+    }
+
+    fn tell(&self, sample: &StateSample) -> Result<()> {
+        if let (Some(truths), Some(body)) = (&self.truths, sample.truth) {
+            truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
+        }
+        Ok(self.states.publish(&spacecraft_state(&self.base.stamper, sample))?)
     }
 
     /// A first sample can be lost to a reader that is still being matched: without this, nothing would ever move.
     fn resend(&self) -> Result<()> {
-        for state in &self.unanswered {
-            self.states.publish(state)?;
-        }
-        Ok(())
+        self.unanswered.iter().try_for_each(|sample| self.tell(sample))
     }
 
     fn linger(&self) -> Result<()> {

@@ -107,7 +107,7 @@ mod tests {
 
     use super::*;
     use crate::config::SimConfig;
-    use crate::learn::env::{Env, EpisodeConfig};
+    use crate::learn::episode::{Env, EpisodeConfig};
     use crate::model::Model;
     use crate::task::{TaskOutcome, TaskRecord};
 
@@ -127,7 +127,6 @@ mod tests {
             t_pre,
             t_acq: 0,
             outcome: TaskOutcome { failure, ..TaskOutcome::NOT_BEGUN },
-            reward: 0.0,
         }
     }
 
