@@ -7,6 +7,7 @@ mod bags;
 mod common;
 mod golden;
 mod help;
+mod kept;
 mod missions;
 mod place;
 mod refusals;
