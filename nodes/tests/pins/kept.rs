@@ -10,9 +10,8 @@ use crate::common::{self, Running, json_lines};
 use crate::golden;
 use crate::place::Place;
 
-/// The kept files in a place of their own: nobody writes to the originals.
-fn place() -> Place {
-    let place = Place::new();
+/// Copies the kept files to a place: nobody writes to the originals.
+fn copied_to(place: Place) -> Place {
     place.copy(&golden::folder().join("kept"), "kept");
     place
 }
@@ -34,12 +33,12 @@ fn the_kept_store_is_exported() {
         "swath strips export --store kept/requests.sqlite",
         "swath strips export --trail --store kept/requests.sqlite",
     ];
-    golden::check("kept/store.txt", &say(&place(), &lines));
+    golden::check("kept/store.txt", &say(&copied_to(Place::new()), &lines));
 }
 
 #[test]
 fn the_kept_bag_is_read() {
-    let place = place();
+    let place = copied_to(Place::new());
     let mut text = say(&place, &["swath-bag info kept/bag", "swath-bag validate kept/bag"]);
     text += &refly(&place, "kept/bag", "");
     assert_eq!(place.read("tasks.jsonl"), place.read("kept/tasks.jsonl"));
@@ -73,7 +72,7 @@ const GONE_ON: &[&str] = &[
 /// The request manager takes the store up where it was left, and operators go on.
 #[test]
 fn the_kept_store_is_taken_up() {
-    let place = place();
+    let place = copied_to(Place::with_domain());
     let new = r#"{"type":"Feature","properties":{"name":"new","client_ref":"new","bidirectional":true},
         "geometry":{"type":"LineString","coordinates":[[20.0,30.0],[22.0,31.5]]}}"#;
     place.write("new.geojson", new);
