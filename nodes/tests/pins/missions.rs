@@ -91,10 +91,24 @@ fn missions_by_policies() {
     golden::check("missions/policies.txt", &in_process(POLICIES));
 }
 
+/// The files that a mission leaves say all that was flown, every default included; the beginning of each.
+#[test]
+fn files_of_a_mission() {
+    let place = Place::new();
+    place.succeed("swath launch <pins>/missions/conditions.toml --orbits 0.1 --requests 2 --in-process --out out");
+    let mut text = String::new();
+    for name in ["mission.toml", "requests.geojson", "tasks.jsonl"] {
+        let file = place.read(&format!("out/{name}"));
+        let beginning: Vec<&str> = file.lines().take(60).collect();
+        _ = writeln!(text, "# {name}\n{}\n", beginning.join("\n"));
+    }
+    golden::check("missions/files.txt", &text);
+}
+
 /// Over DDS the planner node waits for approval; in process nobody is asked.
 #[test]
 fn missions_that_wait_for_approval() {
-    let place = Place::new();
+    let place = Place::with_domain();
     let mut text = String::new();
     for mission in ["approval.toml", "approval.toml --planner lookahead --seed 3"] {
         fly(&place, mission, "--no-bag", &mut text);

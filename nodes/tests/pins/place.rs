@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
+use std::sync::OnceLock;
 
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
@@ -30,8 +31,15 @@ pub struct Said {
 }
 
 impl Place {
+    /// For programs that meet nobody: they share a domain.
     pub fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap(), domain: common::domain() }
+        static SHARED: OnceLock<String> = OnceLock::new();
+        Self { folder: tempfile::tempdir().unwrap(), domain: SHARED.get_or_init(common::domain).clone() }
+    }
+
+    /// For programs that meet over DDS: with a domain of its own.
+    pub fn with_domain() -> Self {
+        Self { domain: common::domain(), ..Self::new() }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

@@ -14,8 +14,13 @@ use crate::place::Place;
 /// Files by name and text, and the command line that is to be refused.
 type Case = (&'static [(&'static str, &'static str)], &'static str);
 
-/// Runs each case, and holds what was said against a golden file.
+/// Holds what is said of some cases against a golden file.
 fn refuse(name: &str, place: &Place, cases: &[Case]) {
+    golden::check(&format!("refusals/{name}.txt"), &refusals(place, cases));
+}
+
+/// Runs each case, and collects what is said.
+fn refusals(place: &Place, cases: &[Case]) -> String {
     let mut text = String::new();
     for (files, line) in cases {
         for (file, content) in *files {
@@ -27,5 +32,5 @@ fn refuse(name: &str, place: &Place, cases: &[Case]) {
         assert!(!said.stderr.contains("panicked"), "{line}: {}", said.stderr);
         _ = writeln!(text, "$ {line}\n{}{}exit code {code}\n", said.stdout, said.stderr);
     }
-    golden::check(&format!("refusals/{name}.txt"), &text);
+    text
 }
