@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use swath_sim::planner::{Decision, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Rationale};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
+
+use crate::guarded::GuardedPlanner;
 
 /// What the planner may do by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -260,6 +262,31 @@ impl Gate {
             let Proposal { number, candidate, .. } = proposal;
             self.last_outcome = format!("proposal {number}, strip {}: {outcome}", candidate.id.0);
         }
+    }
+}
+
+/// A guarded planner that may do by itself what its gate lets through.
+pub struct GatedPlanner {
+    /// What it may do by itself.
+    pub gate: Gate,
+    /// The planner.
+    pub planner: GuardedPlanner,
+}
+
+impl Planner for GatedPlanner {
+    fn name(&self) -> String {
+        self.planner.name()
+    }
+
+    fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+        let planner = &mut self.planner;
+        // The guarded planner's decisions are allowed ones: the heuristic waits when nothing else is left.
+        let plan = |left: &[Candidate]| planner.decide(&DecisionContext { candidates: left, ..*context });
+        self.gate.decide(context.situation.now, context.candidates, plan)
+    }
+
+    fn rationale(&self) -> Option<Rationale> {
+        self.planner.rationale()
     }
 }
 

@@ -13,6 +13,7 @@ use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Plann
 use swath_sim::task::{SettledTask, Totals};
 
 use super::recorded::{NAMESPACE, Recorded};
+use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_mission::in_process::InProcessMission;
 use swath_mission::outcome::TaskLine;
@@ -125,7 +126,10 @@ fn json_line(line: &TaskLine) -> Result<String> {
 /// Flies a recorded mission in process; each request comes at the decision at which it came then.
 fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Result<Flown> {
     let mut planner = Watching {
-        planner: GuardedPlanner::new((policies.make)(planner, recorded.mission.seed)?),
+        planner: GatedPlanner {
+            gate: Gate::new(&recorded.mission.approval, recorded.model.period),
+            planner: GuardedPlanner::new((policies.make)(planner, recorded.mission.seed)?),
+        },
         candidates: Vec::new(),
     };
     let mut flight = InProcessMission::new(&recorded.mission)?;
@@ -146,7 +150,7 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Resul
 
 /// A planner whose choices are noted.
 struct Watching {
-    planner: GuardedPlanner,
+    planner: GatedPlanner,
     candidates: Vec<Vec<u64>>,
 }
 

@@ -16,6 +16,7 @@ use swath_sim::task::Totals;
 
 use output::OutputFolder;
 use progress::Progress;
+use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::file::Mission;
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_mission::in_process::InProcessMission;
@@ -110,11 +111,12 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<()> {
 
 fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Policies) -> Result<Summary> {
     let mut flight = InProcessMission::new(mission)?;
-    let mut planner = GuardedPlanner::make(policies, &mission.planner, mission.seed);
+    let planner = GuardedPlanner::make(policies, &mission.planner, mission.seed);
     if let Some(reason) = planner.missing() {
         tracing::error!("no planner {}: {reason}; {} takes over", mission.planner, planner.name());
     }
     let period = flight.model().period;
+    let mut planner = GatedPlanner { gate: Gate::new(&mission.approval, period), planner };
     let horizon = mission.horizon(flight.model());
     let mut totals = Totals::default();
     let mut progress = Progress::new(horizon, period);

@@ -6,8 +6,7 @@ use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{Task, TaskRecord};
 use swath_sim::vehicle::flight::Situation;
 
-use swath_mission::approval::Gate;
-use swath_mission::guarded::GuardedPlanner;
+use swath_mission::approval::{Gate, GatedPlanner};
 
 /// The candidates of a task.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,18 +39,17 @@ pub struct Planned {
 /// The planner node's state.
 pub struct PlannerLogic {
     model: Model,
-    planner: GuardedPlanner,
-    gate: Gate,
+    planner: GatedPlanner,
     point: Option<(u64, Situation, Option<TaskRecord>)>,
     upcoming: Option<Upcoming>,
     decided: Option<u64>,
 }
 
 impl PlannerLogic {
-    /// A planner node around a planner, which may do by itself what the gate lets through.
+    /// A planner node around a planner.
     #[must_use]
-    pub fn new(model: Model, planner: GuardedPlanner, gate: Gate) -> Self {
-        Self { model, planner, gate, point: None, upcoming: None, decided: None }
+    pub fn new(model: Model, planner: GatedPlanner) -> Self {
+        Self { model, planner, point: None, upcoming: None, decided: None }
     }
 
     /// A task is wanted; `previous` is the one that ended here.
@@ -74,12 +72,12 @@ impl PlannerLogic {
     /// What the planner may do by itself.
     #[must_use]
     pub fn gate(&self) -> &Gate {
-        &self.gate
+        &self.planner.gate
     }
 
     /// What the planner may do by itself.
     pub fn gate_mut(&mut self) -> &mut Gate {
-        &mut self.gate
+        &mut self.planner.gate
     }
 
     /// Name of the planner.
@@ -101,12 +99,9 @@ impl PlannerLogic {
             return None;
         }
         let candidates = &upcoming.candidates;
-        let (gate, planner, model) = (&mut self.gate, &mut self.planner, &self.model);
-        let previous = previous.as_ref();
+        let (previous, model) = (previous.as_ref(), &self.model);
         let context = DecisionContext { task, situation: &situation, candidates, previous, model };
-        // The guarded planner's decisions are allowed ones: the heuristic waits when nothing else is left.
-        let plan = |left: &[Candidate]| planner.decide(&DecisionContext { candidates: left, ..context });
-        let decision = gate.decide(situation.now, candidates, plan).ok()?;
+        let decision = self.planner.decide(&context).ok()?;
         let kind = decision.to_task(&context).ok()?;
         self.decided = Some(task);
         Some(Planned {
@@ -115,7 +110,7 @@ impl PlannerLogic {
             decision,
             kind,
             planner: self.planner.name(),
-            fault: self.planner.fault().map(str::to_owned),
+            fault: self.planner.planner.fault().map(str::to_owned),
             rationale: self.planner.rationale(),
         })
     }
@@ -131,9 +126,12 @@ mod tests {
 
     use super::*;
     use swath_mission::approval::ApprovalConfig;
+    use swath_mission::guarded::GuardedPlanner;
 
-    fn gate(model: &Model) -> Gate {
-        Gate::new(&ApprovalConfig::default(), model.period)
+    fn logic(env: &Env, planner: impl Planner + Send + 'static) -> PlannerLogic {
+        let gate = Gate::new(&ApprovalConfig::default(), env.model().period);
+        let planner = GatedPlanner { gate, planner: GuardedPlanner::new(Box::new(planner)) };
+        PlannerLogic::new((**env.model()).clone(), planner)
     }
 
     struct Broken;
@@ -173,13 +171,7 @@ mod tests {
     fn it_decides_once_when_both_halves_are_there_in_either_order() {
         let env = env();
         let situation = *env.context().situation;
-        let make = || {
-            PlannerLogic::new(
-                (**env.model()).clone(),
-                GuardedPlanner::new(Box::new(Heuristic { t_pre_s: 90.0 })),
-                gate(env.model()),
-            )
-        };
+        let make = || logic(&env, Heuristic { t_pre_s: 90.0 });
         let mut first = make();
         assert_eq!(first.on_decision_point(0, situation, None), None);
         let planned = first.on_upcoming(upcoming(&env, 0)).unwrap();
@@ -193,8 +185,7 @@ mod tests {
     #[test]
     fn the_planner_is_told_how_the_last_task_went() {
         let mut env = env();
-        let mut logic =
-            PlannerLogic::new((**env.model()).clone(), GuardedPlanner::new(Box::new(Echo)), gate(env.model()));
+        let mut logic = logic(&env, Echo);
         logic.on_decision_point(0, *env.context().situation, None);
         assert_eq!(logic.on_upcoming(upcoming(&env, 0)).unwrap().decision, Decision::Wait { ticks: 1 });
         let record = env.step(Decision::Image { candidate: 0, t_pre: 97 }).unwrap().record;
@@ -205,8 +196,7 @@ mod tests {
     #[test]
     fn the_heuristic_takes_over_from_a_planner_that_fails() {
         let env = env();
-        let planner = GuardedPlanner::new(Box::new(Broken));
-        let mut logic = PlannerLogic::new((**env.model()).clone(), planner, gate(env.model()));
+        let mut logic = logic(&env, Broken);
         logic.on_decision_point(0, *env.context().situation, None);
         let planned = logic.on_upcoming(upcoming(&env, 0)).unwrap();
         assert_eq!(planned.planner, "heuristic:90");

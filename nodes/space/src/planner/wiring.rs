@@ -11,7 +11,7 @@ use swath_sim::time::Tick;
 
 use super::logic::{Planned, PlannerLogic};
 use super::messages;
-use swath_mission::approval::Gate;
+use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_node::node::{MissionNode, Severity};
 
@@ -57,12 +57,10 @@ impl PlannerNode {
         let missing = planner
             .missing()
             .map(|reason| (format!("no planner {spec}"), format!("{reason}; {} takes over", planner.name())));
+        let gate = Gate::new(&base.mission.approval, base.model.period);
+        let planner = GatedPlanner { gate, planner };
         Ok(Self {
-            logic: PlannerLogic::new(
-                (*base.model).clone(),
-                planner,
-                Gate::new(&base.mission.approval, base.model.period),
-            ),
+            logic: PlannerLogic::new((*base.model).clone(), planner),
             status: base.node.publisher(&graph::PLANNER_STATUS)?,
             set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
             review: base.node.server(&graph::REVIEW_PROPOSAL)?,
