@@ -120,16 +120,16 @@ impl<K: RequestKeeper> Mission<K> {
         Ok(SettledTask { record, reward })
     }
 
-    /// Decides and flies one task, cut short at the mission's end; nothing once it is over.
+    /// Decides and flies one task, cut short at `until` and at the mission's end; nothing once it is over.
     ///
     /// # Errors
     /// When the planner gave no usable decision.
-    pub fn fly_one(&mut self, planner: &mut dyn Planner) -> Result<Option<SettledTask>, PlannerError> {
+    pub fn fly_one(&mut self, planner: &mut dyn Planner, until: Tick) -> Result<Option<SettledTask>, PlannerError> {
         if self.over() {
             return Ok(None);
         }
         let decision = planner.decide(&self.context())?;
-        self.fly(decision, self.horizon).map(Some)
+        self.fly(decision, until.min(self.horizon)).map(Some)
     }
 
     /// Decides and flies to the mission's end, handing each task to `each`.
@@ -137,7 +137,7 @@ impl<K: RequestKeeper> Mission<K> {
     /// # Errors
     /// The first error of the planner.
     pub fn run(&mut self, planner: &mut dyn Planner, mut each: impl FnMut(&SettledTask)) -> Result<(), PlannerError> {
-        while let Some(settled) = self.fly_one(planner)? {
+        while let Some(settled) = self.fly_one(planner, self.horizon)? {
             each(&settled);
         }
         Ok(())

@@ -5,13 +5,13 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use swath_ground::requests::messages::strip_request;
 use swath_ground::requests::store::Store;
 use swath_mission::file::Mission;
 use swath_mission::orders::geojson;
 use swath_mission::orders::geojson::NamedRequest;
 use swath_mission::requests::logic::RequestLogic;
 use swath_msgs::swath_msgs as msg;
+use swath_node::orders::strip_request;
 use swath_ros::{Client, Environment, Node, RosArgs, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripRequest;

@@ -2,4 +2,5 @@
 
 pub mod messages;
 pub mod node;
+pub mod orders;
 pub mod stamp;

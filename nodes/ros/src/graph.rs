@@ -12,9 +12,9 @@ use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
     CancelStrips, Decision, DecisionPoint, GetStrip, GuidanceStatus, ImagingTask, ListHistory, ListStrips,
-    PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode,
-    SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UpcomingStrips,
-    WheelTorque,
+    OperatorAction, PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips,
+    SetPlannerMode, SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult,
+    UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -137,6 +137,11 @@ pub const TASK_RESULTS: Topic<TaskResult> =
 /// Changes of strip requests.
 pub const STRIP_EVENTS: Topic<StripStatus> =
     Topic::new("requests/events", Profile::Event, &[REQUEST_MANAGER], &[OPERATOR]);
+/// What was asked for of the request manager and taken.
+pub const REQUEST_ACTIONS: Topic<OperatorAction> =
+    Topic::new("requests/actions", Profile::Event, &[REQUEST_MANAGER], &[]);
+/// What was asked for of the planner and taken.
+pub const PLANNER_ACTIONS: Topic<OperatorAction> = Topic::new("planner/actions", Profile::Event, &[PLANNER], &[]);
 /// How many strip requests are in which state.
 pub const REQUEST_SUMMARY: Topic<RequestSummary> =
     Topic::new("requests/summary", Profile::Latched, &[REQUEST_MANAGER], &[LAUNCHER, OPERATOR]);
@@ -192,11 +197,13 @@ pub const TOPICS: &[Entry] = &[
     STRIP_REQUEST.entry,
     TASK_RESULTS.entry,
     STRIP_EVENTS.entry,
+    REQUEST_ACTIONS.entry,
     REQUEST_SUMMARY.entry,
     TASK_ABORT.entry,
     PLANNER_TASK.entry,
     PLANNER_DECISION.entry,
     PLANNER_STATUS.entry,
+    PLANNER_ACTIONS.entry,
     DIAGNOSTICS.entry,
     ROSOUT.entry,
     PARAMETER_EVENTS.entry,

@@ -17,9 +17,11 @@ use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use swath_mission::file::{Mission, MissionRequests};
+use swath_mission::orders::action::{Act, Action};
 use swath_mission::orders::geojson::NamedRequest;
 use swath_mission::outcome::TaskLine;
 use swath_mission::task_log::TaskLog;
+use swath_node::orders::action;
 
 /// The namespace in which a mission's nodes run unless they are told otherwise.
 pub const NAMESPACE: &str = "/swath";
@@ -42,17 +44,6 @@ pub struct Recorded {
     pub events: Vec<msg::StripStatus>,
     /// Whether the recording reaches the mission's end.
     pub complete: bool,
-}
-
-/// A request with the time of its coming.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Arrival {
-    /// The first decision that knew of it.
-    pub decision: u64,
-    /// Tick at which the request manager took it.
-    pub since: Tick,
-    /// What was asked for.
-    pub request: NamedRequest,
 }
 
 impl Recorded {
@@ -174,18 +165,36 @@ impl Recorded {
         Ok(())
     }
 
-    /// Every request that was accepted, in order, with the decision that first knew of it.
+    /// What was asked for and taken: of the request manager, and of the planner, each in order.
     ///
     /// # Errors
     /// When the recording does not begin with the mission, or a strip is missing in it.
-    pub fn arrivals(&self) -> Result<Vec<Arrival>> {
+    pub fn actions(&self) -> Result<(Vec<Action>, Vec<Action>)> {
+        if !self.has(&graph::REQUEST_ACTIONS) {
+            return Ok((self.arrivals()?, Vec::new()));
+        }
+        Ok((self.actions_on(&graph::REQUEST_ACTIONS)?, self.actions_on(&graph::PLANNER_ACTIONS)?))
+    }
+
+    fn actions_on(&self, topic: &graph::Topic<msg::OperatorAction>) -> Result<Vec<Action>> {
+        let mut actions = Vec::new();
+        if self.has(topic) {
+            self.for_each(topic, |message| {
+                actions.push(action(&message)?);
+                Ok(())
+            })?;
+        }
+        Ok(actions)
+    }
+
+    /// The strips of a bag from before actions were recorded, as its events and offers tell of them.
+    fn arrivals(&self) -> Result<Vec<Action>> {
         let Some(first) = self.offers.get(&0) else { bail!("the recording does not begin with the mission") };
         // The strips known at the first decision are those pending, those held, and those that expired at once.
         let is_at_first = |event: &&msg::StripStatus| event.tick == first.tick && event.strip.id > 0;
         let not_offered = [msg::StripStatus::STATE_EXPIRED, msg::StripStatus::STATE_HELD];
         let left_out = |event: &&msg::StripStatus| not_offered.contains(&event.state);
         let known = first.pending + self.events.iter().filter(is_at_first).filter(left_out).count() as u64;
-        let starts: Vec<Tick> = self.offers.values().map(|offer| Tick(offer.tick)).collect();
         let mut arrivals = Vec::new();
         let mut next = 1;
         for event in self.first_events()?.values() {
@@ -195,16 +204,18 @@ impl Recorded {
             }
             let bidirectional = event.linked_to == id + 1;
             next = id + 1 + u64::from(bidirectional);
-            let decision = match id <= known {
-                true => 0,
-                false => starts.partition_point(|start| start.0 <= event.tick) as u64,
-            };
             let mut request = request_of_strip(&event.strip);
             request.bidirectional = bidirectional;
             let (client_ref, name) = (event.client_ref.clone(), event.strip.name.clone());
-            let request =
-                NamedRequest { submitter: event.submitter.clone(), ..NamedRequest::new(client_ref, name, request) };
-            arrivals.push(Arrival { decision, since: Tick(event.tick), request });
+            let submitter = event.submitter.clone();
+            let named = NamedRequest { submitter, ..NamedRequest::new(client_ref, name, request) };
+            arrivals.push(Action {
+                at: Tick(event.tick),
+                initial: id <= known,
+                actor: event.submitter.clone(),
+                reason: String::new(),
+                act: Act::Submit(StripId(id), Box::new(named)),
+            });
         }
         Ok(arrivals)
     }

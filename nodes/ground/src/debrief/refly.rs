@@ -1,6 +1,6 @@
 //! `swath-bag refly`: a recorded mission flown again in process, beside what was recorded.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -10,12 +10,14 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, PlannerSpec};
-use swath_sim::task::{SettledTask, Totals};
+use swath_sim::task::{FailureReason, SettledTask, Totals};
+use swath_sim::time::Tick;
 
 use super::recorded::{NAMESPACE, Recorded};
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_mission::in_process::InProcessMission;
+use swath_mission::orders::action::{Act, Action};
 use swath_mission::outcome::TaskLine;
 
 /// Arguments of `refly`.
@@ -123,34 +125,31 @@ fn json_line(line: &TaskLine) -> Result<String> {
     Ok(serde_json::to_string(line)?)
 }
 
-/// Flies a recorded mission in process; each request comes at the decision at which it came then.
+/// Flies a recorded mission in process; what was asked for on the way comes at the ticks at which it came then.
 fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Result<Flown> {
-    let mut planner = Watching {
-        planner: GatedPlanner {
-            gate: Gate::new(&recorded.mission.approval, recorded.model.period),
-            planner: GuardedPlanner::new((policies.make)(planner, recorded.mission.seed)?),
-        },
-        candidates: Vec::new(),
-    };
-    let mut flight = InProcessMission::new(&recorded.mission)?;
-    let arrivals = recorded.arrivals()?;
-    let mut arrivals = arrivals.iter().peekable();
+    let (actions, operators) = recorded.actions()?;
+    let gate = Gate::new(&recorded.mission.approval, recorded.model.period);
+    let own = *planner == recorded.mission.planner;
+    let planner = GuardedPlanner::new((policies.make)(planner, recorded.mission.seed)?);
+    let planner = GatedPlanner { gate, planner };
+    let mut planner = Watching { planner, operators: operators.into(), candidates: Vec::new() };
+    let mut flight = InProcessMission::with_actions(&recorded.mission, actions)?;
     let mut tasks = Vec::new();
     loop {
-        while let Some(arrival) = arrivals.next_if(|arrival| arrival.decision <= tasks.len() as u64) {
-            // Why one is refused is in the request manager's counts.
-            _ = flight.change(|requests| requests.submit_at(arrival.request.clone(), arrival.since));
-        }
-        match flight.step(&mut planner)? {
+        // A task that was given up then is given up now, at the same tick.
+        let then = recorded.tasks.get(tasks.len()).map(|(task, _)| &task.record).filter(|_| own);
+        let given_up = then.filter(|then| then.outcome.failure == Some(FailureReason::Interrupted));
+        match flight.step(&mut planner, given_up.map_or(Tick(u64::MAX), |then| then.end))? {
             Some(task) => tasks.push(task),
             None => return Ok(Flown { tasks, candidates: planner.candidates }),
         }
     }
 }
 
-/// A planner whose choices are noted.
+/// A planner whose choices are noted, and to whom operators say what they said then.
 struct Watching {
     planner: GatedPlanner,
+    operators: VecDeque<Action>,
     candidates: Vec<Vec<u64>>,
 }
 
@@ -160,6 +159,15 @@ impl Planner for Watching {
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+        let now = context.situation.now;
+        while let Some(action) = self.operators.pop_front_if(|action| action.initial || action.at < now) {
+            match action.act {
+                Act::SetMode(mode) => self.planner.gate.set_mode(mode),
+                // With another planner another proposal may be open, or none: then nobody decides.
+                Act::Decide { proposal, approve } => _ = self.planner.gate.review(proposal, approve, &action.actor),
+                _ => {}
+            }
+        }
         self.candidates.push(context.candidates.iter().map(|candidate| candidate.id.0).collect());
         self.planner.decide(context)
     }

@@ -15,11 +15,11 @@ use super::read_files;
 use super::show::{
     opportunity_json, opportunity_table, report_json, report_text, status_head, status_json, status_line,
 };
-use crate::requests::messages::strip_request;
 use swath_mission::orders::geojson::Lengths;
 use swath_mission::requests::index::Area;
 use swath_mission::requests::lifecycle::State;
 use swath_mission::time_text;
+use swath_node::orders::strip_request;
 
 /// `swath strips preview`.
 #[derive(Debug, Args)]

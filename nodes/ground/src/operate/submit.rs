@@ -11,8 +11,8 @@ use swath_sim::config::SimConfig;
 use super::client::{Operator, check};
 use super::show::print_result;
 use super::{Actor, read_files};
-use crate::requests::messages::strip_request;
 use swath_mission::orders::geojson::Lengths;
+use swath_node::orders::strip_request;
 
 /// Requests in one call.
 const BATCH: usize = 500;

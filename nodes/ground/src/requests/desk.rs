@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 use anyhow::Result;
 use swath_msgs::RosService;
 use swath_msgs::swath_msgs as msg;
+use swath_node::orders::named_request;
+use swath_node::orders::strip_request;
 use swath_ros::{Node, RequestId, RosError, Server, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
@@ -84,8 +86,7 @@ impl Desk {
             outgoing.push(Outgoing::Cancelled(id, msg::CancelStripsResponse { results, reason_code, reason }));
         }
         while let Some((id, call)) = next(&self.replace)? {
-            let result =
-                messages::submit_result(logic.replace(StripId(call.id), messages::named_request(&call.request)));
+            let result = messages::submit_result(logic.replace(StripId(call.id), named_request(&call.request)));
             outgoing.push(Outgoing::Replaced(id, msg::ReplaceStripResponse { result }));
         }
         while let Some((id, call)) = next(&self.review)? {
@@ -119,8 +120,7 @@ impl Desk {
         {
             let taken = job.requests.by_ref().take(left);
             let before = job.results.len();
-            job.results
-                .extend(taken.map(|request| messages::submit_result(logic.submit(messages::named_request(&request)))));
+            job.results.extend(taken.map(|request| messages::submit_result(logic.submit(named_request(&request)))));
             left -= job.results.len() - before;
             if job.requests.len() == 0
                 && let Some(Job { id, results, .. }) = self.jobs.pop_front()
@@ -184,7 +184,7 @@ fn list(logic: &RequestLogic, base: &MissionNode, call: &msg::ListStripsRequest)
 
 fn preview(logic: &RequestLogic, base: &MissionNode, call: &msg::PreviewStripRequest) -> msg::PreviewStripResponse {
     let found = horizon(logic, base, call.horizon_s).and_then(|until| match call.id {
-        0 => logic.preview(&messages::named_request(&call.request), until),
+        0 => logic.preview(&named_request(&call.request), until),
         id => logic.outlook(StripId(id), until),
     });
     let now = base.stamper.time(logic.now());
@@ -239,7 +239,7 @@ fn get(
     let history = store.history(id)?;
     let report = msg::StripReport {
         status: messages::strip_status(&base.stamper, logic, id, request),
-        request: messages::strip_request(&request.named),
+        request: strip_request(&request.named),
         opportunities: outlook.iter().map(|it| messages::opportunity(&base.stamper, it)).collect::<Vec<_>>(),
         attempts,
         history: history.iter().map(|line| messages::history_entry(&base.stamper, line)).collect::<Vec<_>>(),

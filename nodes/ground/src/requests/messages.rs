@@ -9,38 +9,12 @@ use swath_mission::requests::query::{Filter, Opportunity};
 use swath_mission::requests::refusal::Refusal;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
-use swath_node::stamp::{EARTH_FRAME, Stamper, nanoseconds};
+use swath_node::stamp::{EARTH_FRAME, Stamper};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::time::Tick;
-use swath_sim::world::strip::{StripId, StripRequest};
+use swath_sim::world::strip::StripId;
 
 use super::store::HistoryLine;
-
-/// A request as the request manager takes it; its values are checked there, each with its reason.
-#[must_use]
-pub fn named_request(message: &msg::StripRequest) -> NamedRequest {
-    let unset = |time: &Time| *time == Time::default();
-    // A time before 1970 is not the same as none.
-    let end = |time: &Time| if unset(time) { 0 } else { nanoseconds(time).max(1) };
-    NamedRequest {
-        client_ref: message.client_ref.clone(),
-        submitter: message.submitter.clone(),
-        name: message.name.clone(),
-        request: StripRequest {
-            start_latitude_deg: message.start_latitude_deg,
-            start_longitude_deg: message.start_longitude_deg,
-            end_latitude_deg: message.end_latitude_deg,
-            end_longitude_deg: message.end_longitude_deg,
-            priority: message.priority,
-            acquisition_speed_m_s: message.acquisition_speed,
-            bidirectional: message.bidirectional,
-        },
-        valid_from_ns: nanoseconds(&message.valid_from),
-        valid_until_ns: end(&message.valid_until),
-        hold_for_approval: message.hold_for_approval,
-        max_attempts: message.max_attempts,
-    }
-}
 
 /// A task that images a strip; `None` for a wait.
 #[must_use]
@@ -145,29 +119,6 @@ pub fn upcoming_strips<'a>(
         candidates: candidates.collect::<Vec<_>>(),
         pending: offer.pending as u64,
         fulfilled: offer.fulfilled as u64,
-    }
-}
-
-/// A request as an operator submits it.
-#[must_use]
-pub fn strip_request(named: &NamedRequest) -> msg::StripRequest {
-    let request = &named.request;
-    let time = |ns: u64| if ns == 0 { Time::default() } else { swath_ros::stamp(ns) };
-    msg::StripRequest {
-        client_ref: named.client_ref.clone(),
-        submitter: named.submitter.clone(),
-        name: named.name.clone(),
-        start_latitude_deg: request.start_latitude_deg,
-        start_longitude_deg: request.start_longitude_deg,
-        end_latitude_deg: request.end_latitude_deg,
-        end_longitude_deg: request.end_longitude_deg,
-        priority: request.priority,
-        acquisition_speed: request.acquisition_speed_m_s,
-        bidirectional: request.bidirectional,
-        valid_from: time(named.valid_from_ns),
-        valid_until: time(named.valid_until_ns),
-        hold_for_approval: named.hold_for_approval,
-        max_attempts: named.max_attempts,
     }
 }
 

@@ -225,6 +225,8 @@ impl Store {
                 Entry::Added(added) => insert_request(&transaction, added)?,
                 Entry::Changed(change) => insert_change(&transaction, change)?,
                 Entry::Attempted(attempt) => insert_attempt(&transaction, attempt)?,
+                // The changes that follow from it tell of it here.
+                Entry::Taken(_) => {}
             }
         }
         write_progress(&transaction, progress)?;

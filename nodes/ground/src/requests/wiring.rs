@@ -21,6 +21,7 @@ use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
 use swath_node::node::{MissionNode, Severity};
+use swath_node::orders::{named_request, operator_action};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
@@ -54,6 +55,7 @@ struct RequestNode {
     results: Publisher<msg::TaskResult>,
     /// Tasks below this number have been told of.
     told: u64,
+    actions: Publisher<msg::OperatorAction>,
     summary: Publisher<msg::RequestSummary>,
     aborts: Publisher<msg::TaskAbort>,
     last: Option<msg::UpcomingStrips>,
@@ -94,6 +96,7 @@ impl RequestNode {
             events: base.node.publisher(&graph::STRIP_EVENTS)?,
             results: base.node.publisher(&graph::TASK_RESULTS)?,
             told: 0,
+            actions: base.node.publisher(&graph::REQUEST_ACTIONS)?,
             summary: base.node.publisher(&graph::REQUEST_SUMMARY)?,
             aborts: base.node.publisher(&graph::TASK_ABORT)?,
             last: None,
@@ -136,7 +139,7 @@ impl RequestNode {
             }
         }
         while let Some(request) = self.requests.take()? {
-            if let Err(refusal) = self.logic.submit(messages::named_request(&request)) {
+            if let Err(refusal) = self.logic.submit(named_request(&request)) {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
@@ -243,8 +246,12 @@ impl RequestNode {
 
     fn tell_news(&self, entries: &[Entry]) -> Result<()> {
         for entry in entries {
-            if let Entry::Changed(change) = entry {
-                self.events.publish(&messages::change(&self.base.stamper, &self.logic, change))?;
+            match entry {
+                Entry::Changed(change) => {
+                    self.events.publish(&messages::change(&self.base.stamper, &self.logic, change))?;
+                }
+                Entry::Taken(action) => self.actions.publish(&operator_action(&self.base.stamper, action))?,
+                Entry::Added(_) | Entry::Attempted(_) => {}
             }
         }
         Ok(())

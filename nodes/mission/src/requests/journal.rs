@@ -6,6 +6,7 @@ use swath_sim::world::strip::StripId;
 use swath_sim::world::windows::Window;
 
 use super::lifecycle::State;
+use crate::orders::action::Action;
 use crate::orders::geojson::NamedRequest;
 
 /// A line of the journal.
@@ -17,6 +18,8 @@ pub enum Entry {
     Changed(Change),
     /// An attempt ended.
     Attempted(Attempt),
+    /// Something that was asked for was taken.
+    Taken(Box<Action>),
 }
 
 /// A request that got a number.

@@ -20,6 +20,7 @@ use super::intake::{Place, place, same_order};
 use super::journal::{Change, Entry, InFlight, Progress, Standing};
 use super::lifecycle::State;
 use super::refusal::{Refusal, check_text};
+use crate::orders::action::{Act, Action};
 use crate::orders::geojson::NamedRequest;
 
 /// What the planner is offered for a task.
@@ -122,6 +123,8 @@ pub struct RequestLogic {
     pub(super) progress: Progress,
     /// Number of the last task that was wanted.
     wanted: u64,
+    /// Whether a task was ever wanted.
+    begun: bool,
     /// The imaging task that was settled last, with its reward.
     pub(super) last_settled: Option<(u64, f64)>,
     pub(super) journal: Vec<Entry>,
@@ -148,6 +151,7 @@ impl RequestLogic {
             reward: 0.0,
             progress: Progress::default(),
             wanted: 0,
+            begun: false,
             last_settled: None,
             journal: Vec::new(),
             aborts: Vec::new(),
@@ -169,6 +173,7 @@ impl RequestLogic {
         self.rejected = rejected;
         self.progress = progress;
         self.last_settled = last_settled;
+        self.begun = self.progress.now > Tick(0);
         let links: Vec<_> = stored.iter().map(|stored| stored.linked).collect();
         for Stored { request, windows, .. } in stored {
             let strip =
@@ -208,9 +213,15 @@ impl RequestLogic {
     /// # Errors
     /// Why it is refused.
     pub fn submit_at(&mut self, named: NamedRequest, at: Tick) -> Result<StripId, Refusal> {
+        let known = self.len();
         let result = self.take_in(&named, None, at);
-        if let Err(refusal) = &result {
-            self.note_refusal(named, refusal, at);
+        match &result {
+            Ok(id) if self.len() > known => {
+                let actor = named.submitter.clone();
+                self.taken(at, actor, String::new(), Act::Submit(*id, Box::new(named)));
+            }
+            Ok(_) => {}
+            Err(refusal) => self.note_refusal(named, refusal, at),
         }
         result
     }
@@ -220,22 +231,26 @@ impl RequestLogic {
     /// # Errors
     /// Why it is refused; the other one stays as it is then.
     pub fn replace(&mut self, old: StripId, named: NamedRequest) -> Result<StripId, Refusal> {
+        self.replace_at(old, named, self.now())
+    }
+
+    fn replace_at(&mut self, old: StripId, named: NamedRequest, at: Tick) -> Result<StripId, Refusal> {
         if let Some(new) = self.request(old).and_then(|request| request.standing.superseded_by)
             && self.by_reference(&named.submitter, &named.client_ref) == Some(new)
             && self.request(new).is_some_and(|request| same_order(&request.named, &named))
         {
             return Ok(new);
         }
-        let now = self.now();
-        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old), now));
+        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old), at));
         let new = match result {
             Ok(new) => new,
             Err(refusal) => {
-                self.note_refusal(named, &refusal, now);
+                self.note_refusal(named, &refusal, at);
                 return Err(refusal);
             }
         };
-        let (actor, text) = (named.submitter, format!("replaced by request {}", new.0));
+        let (actor, text) = (named.submitter.clone(), format!("replaced by request {}", new.0));
+        self.taken(at, actor.clone(), String::new(), Act::Replace(old, Box::new(named)));
         for id in self.both_ways(old, State::Superseded)? {
             self.requests[id.0 as usize - 1].standing.superseded_by = Some(new);
             self.leave(id, State::Superseded, (0, text.clone()), &actor)?;
@@ -253,6 +268,7 @@ impl RequestLogic {
         for id in self.both_ways(id, State::CancelledByUser)? {
             self.leave(id, State::CancelledByUser, (0, reason.to_owned()), actor)?;
         }
+        self.taken(self.now(), actor.to_owned(), reason.to_owned(), Act::Cancel(id));
         Ok(())
     }
 
@@ -287,7 +303,29 @@ impl RequestLogic {
                 Review::Reject => self.leave(id, to, (0, reason.to_owned()), actor)?,
             }
         }
+        self.taken(self.now(), actor.to_owned(), reason.to_owned(), Act::Review(id, review));
         Ok(())
+    }
+
+    /// Takes something that was taken before, in another flight of the same mission.
+    ///
+    /// # Errors
+    /// Why it is refused now.
+    pub fn take_again(&mut self, action: &Action) -> Result<(), Refusal> {
+        let (actor, reason) = (&action.actor, &action.reason);
+        match &action.act {
+            Act::Submit(_, named) => self.submit_at((**named).clone(), action.at).map(drop),
+            Act::Replace(old, named) => self.replace_at(*old, (**named).clone(), action.at).map(drop),
+            Act::Cancel(id) => self.cancel(*id, actor, reason),
+            Act::Review(id, review) => self.review(*id, *review, actor, reason),
+            // These are the planner's.
+            Act::SetMode(_) | Act::Decide { .. } => Ok(()),
+        }
+    }
+
+    fn taken(&mut self, at: Tick, actor: String, reason: String, act: Act) {
+        let action = Action { at, initial: !self.begun, actor, reason, act };
+        self.journal.push(Entry::Taken(Box::new(action)));
     }
 
     /// A task is wanted at `now`; `results` are those of tasks that have ended, also ones that are known. Answers with
@@ -295,6 +333,7 @@ impl RequestLogic {
     pub fn on_decision_point(&mut self, task: u64, now: Tick, results: &[TaskRecord]) -> Offer {
         self.progress.now = self.progress.now.max(now);
         self.wanted = self.wanted.max(task);
+        self.begun = true;
         for record in results {
             self.on_result(record);
         }

@@ -1,8 +1,8 @@
 //! The planner's messages.
 
-use swath_mission::approval::Mode;
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::{MessageError, acquisition};
+use swath_node::orders::mode_number;
 use swath_node::stamp::{EARTH_FRAME, Stamper};
 use swath_sim::model::Model;
 use swath_sim::planner::Decision;
@@ -65,11 +65,7 @@ pub fn planner_status(stamper: &Stamper, now: Tick, logic: &PlannerLogic, strip:
     let gate = logic.gate();
     let status = msg::PlannerStatus {
         header: stamper.header(now, EARTH_FRAME),
-        mode: match gate.mode() {
-            Mode::Autonomous => msg::PlannerStatus::MODE_AUTONOMOUS,
-            Mode::Approve => msg::PlannerStatus::MODE_APPROVE,
-            Mode::Hold => msg::PlannerStatus::MODE_HOLD,
-        },
+        mode: mode_number(gate.mode()),
         planner: logic.planner_name(),
         last_outcome: gate.last_outcome().to_owned(),
         ..msg::PlannerStatus::default()
@@ -110,18 +106,5 @@ pub fn decision(stamper: &Stamper, planned: &Planned, upcoming: &Upcoming, compu
         chosen,
         t_pre_ticks,
         compute_time_s,
-    }
-}
-
-/// What the planner may do by itself.
-///
-/// # Errors
-/// When the mode is none of the constants.
-pub fn planner_mode(mode: u8) -> Result<Mode, MessageError> {
-    match mode {
-        msg::PlannerStatus::MODE_AUTONOMOUS => Ok(Mode::Autonomous),
-        msg::PlannerStatus::MODE_APPROVE => Ok(Mode::Approve),
-        msg::PlannerStatus::MODE_HOLD => Ok(Mode::Hold),
-        value => Err(MessageError::Constant { field: "mode", value }),
     }
 }

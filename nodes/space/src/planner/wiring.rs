@@ -3,8 +3,10 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use swath_mission::orders::action::{Act, Action};
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::{situation, task_record};
+use swath_node::orders::{operator_action, planner_mode};
 use swath_ros::{Publisher, Server, Spec, Subscription, graph};
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::time::Tick;
@@ -37,6 +39,7 @@ struct PlannerNode {
     tasks: Publisher<msg::ImagingTask>,
     decisions: Publisher<msg::Decision>,
     status: Publisher<msg::PlannerStatus>,
+    actions: Publisher<msg::OperatorAction>,
     set_mode: Server<msg::SetPlannerMode>,
     review: Server<msg::ReviewProposal>,
     status_told: Option<msg::PlannerStatus>,
@@ -62,6 +65,7 @@ impl PlannerNode {
         Ok(Self {
             logic: PlannerLogic::new((*base.model).clone(), planner),
             status: base.node.publisher(&graph::PLANNER_STATUS)?,
+            actions: base.node.publisher(&graph::PLANNER_ACTIONS)?,
             set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
             review: base.node.server(&graph::REVIEW_PROPOSAL)?,
             status_told: None,
@@ -119,11 +123,15 @@ impl PlannerNode {
 
     /// What operators say; it counts from the next decision on.
     fn take_orders(&mut self) -> Result<()> {
+        let mut taken = Vec::new();
+        let (at, initial) = (self.now, self.last.is_none());
+        let mut note = |actor: String, act: Act| taken.push(Action { at, initial, actor, reason: String::new(), act });
         let gate = self.logic.gate_mut();
-        self.set_mode.answer_all(|call| match messages::planner_mode(call.mode) {
+        self.set_mode.answer_all(|call| match planner_mode(call.mode) {
             Ok(mode) => {
                 tracing::info!("{} sets the mode to {mode:?}", call.actor);
                 gate.set_mode(mode);
+                note(call.actor, Act::SetMode(mode));
                 msg::SetPlannerModeResponse { accepted: true, reason: String::new() }
             }
             Err(error) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
@@ -132,10 +140,14 @@ impl PlannerNode {
             Ok(proposal) => {
                 let verb = if call.approve { "approves" } else { "rejects" };
                 tracing::info!("{} {verb} proposal {proposal}", call.actor);
+                note(call.actor, Act::Decide { proposal, approve: call.approve });
                 msg::ReviewProposalResponse { accepted: true, proposal, reason: String::new() }
             }
             Err(error) => msg::ReviewProposalResponse { reason: error.to_string(), ..Default::default() },
         })?;
+        for action in taken {
+            self.actions.publish(&operator_action(&self.base.stamper, &action))?;
+        }
         Ok(())
     }
 
