@@ -7,6 +7,7 @@ mod cli;
 mod drawing;
 mod learning;
 mod networks;
+mod paper;
 mod policy;
 mod results;
 mod resume;
