@@ -115,3 +115,18 @@ fn a_beam_without_a_budget_still_decides() {
     }
     assert!(totals.fulfilled > 60 && totals.failed_attitude == 0, "{totals:?}");
 }
+
+#[test]
+fn the_number_asked_for_is_that_of_the_episode() {
+    // From pole to pole over a day every strip can be reached, so the catalogue has all of them.
+    let mut config = SimConfig::default();
+    config.orbit.inclination_deg = 90.0;
+    let model = Arc::new(Model::new(config).unwrap());
+    let mut episode = EpisodeConfig { orbits: 15.0, ..EpisodeConfig::default() };
+    episode.scenario.count = [100, 140];
+    for seed in 0..3 {
+        let env = Env::episode(model.clone(), &episode, seed);
+        assert_eq!(env.catalogue().len(), episode.scenario.count_of(seed));
+    }
+    assert_ne!(episode.scenario.count_of(0), episode.scenario.count_of(1));
+}

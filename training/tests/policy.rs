@@ -1,7 +1,5 @@
 //! A policy file flies as it was trained: same observation, same action.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{in_range, ordered};
 use crate::error::SimError;
-use crate::rng::Rng;
+use crate::rng::{self, Rng};
 use crate::world::frames::{direction_E, latitude_longitude_deg};
 use crate::world::strip::StripRequest;
 
@@ -53,6 +53,12 @@ impl ScenarioConfig {
             ordered(name, min, max)?;
         }
         Ok(())
+    }
+
+    /// Number of strips that an episode of this seed asks for, whether they can be reached or not.
+    #[must_use]
+    pub fn count_of(&self, seed: u64) -> usize {
+        self.draw_count(&mut rng::stream(seed, rng::CATALOGUE))
     }
 
     /// Draws the number of strips of a scenario.
@@ -100,7 +106,6 @@ fn uniform(rng: &mut Rng, [min, max]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::config::RequestLimits;
-    use crate::rng;
 
     const EARTH_RADIUS_M: f64 = 6_378_136.6;
 
