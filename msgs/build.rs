@@ -1,5 +1,8 @@
 //! Generates the Rust types, schema texts and type hashes from the interface files.
 
+#[path = "src/definition/mod.rs"]
+#[allow(dead_code, unused_imports, reason = "the generator reads single files only")]
+mod definition;
 #[path = "build/describe.rs"]
 mod describe;
 #[path = "build/emit.rs"]
@@ -32,6 +35,7 @@ fn generate() -> Result<(), String> {
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?);
     fs::write(out.join("interfaces.rs"), source).map_err(|error| error.to_string())?;
     println!("cargo::rerun-if-changed=build");
+    println!("cargo::rerun-if-changed=src/definition");
     for folder in ["msg", "srv", "standard"] {
         println!("cargo::rerun-if-changed={folder}");
     }

@@ -15,7 +15,7 @@ use std::{
 
 use serde_json::{Value, json};
 use swath_bags::{
-    Bag, BagOptions, BagWriter, Compression, Filter, Topic, TopicPattern,
+    Bag, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
     play::{PlayOptions, Player},
     qos::QosProfile,
     record::{RecordOptions, Recorder},
@@ -226,6 +226,7 @@ fn publish(rate: u64, n: u64) -> Value {
 fn play(bag: &Path, rate: f64) -> Value {
     let options = PlayOptions {
         bags: vec![bag.to_owned()],
+        read: ReadOptions::default(),
         topics: TopicPattern::default(),
         rate,
         repeat: false,

@@ -3,6 +3,11 @@
 //! Their checksums are zero, which means unchecked, so that changed bytes reach the parsers.
 #![allow(clippy::unwrap_used, reason = "an example that cannot go on should panic")]
 
+#[path = "../tests/common/conformance.rs"]
+mod conformance;
+#[path = "../tests/common/mutate.rs"]
+mod mutate;
+
 use std::{env, fs, path::Path};
 
 use swath_bags::{BagOptions, BagWriter, Compression, Topic, qos::QosProfile};
@@ -16,7 +21,7 @@ fn main() {
         let dir = temp.path().join(&name);
         write(&dir, compression);
         let mut bytes = fs::read(dir.join(format!("{name}_0.mcap"))).unwrap();
-        clear_checksums(&mut bytes);
+        mutate::clear_checksums(&mut bytes);
         fs::write(Path::new(&to).join(format!("{name}.mcap")), bytes).unwrap();
     }
 }
@@ -37,22 +42,4 @@ fn write(dir: &Path, compression: Compression) {
     }
     bag.add_metadata("facts", [("a".to_owned(), "b".to_owned())].into());
     bag.close().unwrap();
-}
-
-/// Sets the checksums of chunks (opcode 6), data section (15) and summary (2) to zero.
-fn clear_checksums(bytes: &mut [u8]) {
-    let mut at = 8;
-    while at + 9 <= bytes.len() - 8 {
-        let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
-        let checksum = match bytes[at] {
-            0x06 => Some(at + 9 + 24),
-            0x0f => Some(at + 9),
-            0x02 => Some(at + 9 + 16),
-            _ => None,
-        };
-        if let Some(checksum) = checksum {
-            bytes[checksum..checksum + 4].fill(0);
-        }
-        at += 9 + len;
-    }
 }

@@ -45,6 +45,29 @@ pub enum BagError {
         /// What is wrong there.
         reason: String,
     },
+    /// Something in a bag file is larger than what is read into memory.
+    #[error("{path}: offset {offset}: {what} of {bytes} bytes, the limit is {limit}: raise it with --max-record-size")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Byte offset in the file of what is too large; in a SQLite file, the row.
+        offset: u64,
+        /// What it is.
+        what: &'static str,
+        /// Its size [bytes].
+        bytes: u64,
+        /// The limit [bytes].
+        limit: u64,
+    },
+    /// A SQLite file cannot be read.
+    #[error("cannot read {path}")]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// SQLite's reason.
+        #[source]
+        source: rusqlite::Error,
+    },
     /// `metadata.yaml` cannot be understood.
     #[error("{path}: {reason}")]
     Metadata {
@@ -123,6 +146,13 @@ impl BagError {
     /// Whether an I/O error means that the file can no longer grow.
     pub(crate) fn is_disk_full(error: &io::Error) -> bool {
         matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge)
+    }
+}
+
+impl From<BagError> for io::Error {
+    /// For copying, where what is read may fail as what is written.
+    fn from(error: BagError) -> Self {
+        Self::other(error)
     }
 }
 

@@ -4,7 +4,6 @@
 //! `metadata.yaml`. This crate knows message types only by their schema texts.
 
 pub mod cli;
-pub mod date;
 mod error;
 mod file;
 pub mod metadata;
@@ -20,6 +19,7 @@ mod writer;
 
 pub use error::{BagError, Result, chain};
 pub use file::chunk::Compression;
-pub use reader::{Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
-pub use topic::Topic;
+pub use file::source::ReadOptions;
+pub use reader::{Attachment, Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
+pub use topic::{Definition, Topic};
 pub use writer::{BagOptions, BagSummary, BagWriter, Counter, Losses, RECORDING, TopicId};

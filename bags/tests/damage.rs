@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 
 use common::write_sample;
 use swath_bags::{
-    Bag, BagError, BagOptions, Compression, Filter,
+    Bag, BagError, BagOptions, Compression, Filter, ReadOptions,
     ops::{recover::recover, validate::validate},
 };
 
@@ -48,10 +48,10 @@ fn a_file_cut_off_anywhere_is_an_error_and_recovers_what_was_whole() {
         let Some(BagError::Corrupt { offset, reason, .. }) = error else { panic!("cut at {len}: {error:?}") };
         assert!(offset <= len as u64 && !reason.is_empty());
         let to = temp.path().join(format!("saved {len}"));
-        let saved = recover(&cut, &to, BagOptions::default()).unwrap();
+        let saved = recover(&cut, &to, BagOptions::default(), ReadOptions::default()).unwrap();
         assert!(saved.summary.messages >= saved_before, "cut at {len}");
         saved_before = saved.summary.messages;
-        assert_eq!(validate(&to, None).unwrap().faults, [""; 0], "cut at {len}");
+        assert_eq!(validate(&to, None, ReadOptions::default()).unwrap().faults, [""; 0], "cut at {len}");
     }
     assert_eq!(saved_before, 121, "only the index was cut off");
 }
@@ -72,7 +72,7 @@ fn a_flipped_bit_never_panics_and_never_passes_for_a_message() {
             if let Some(error) = error {
                 assert!(matches!(error, BagError::Corrupt { .. }), "byte {at}: {error:?}");
             }
-            let faults = validate(&flipped, None).unwrap().faults;
+            let faults = validate(&flipped, None, ReadOptions::default()).unwrap().faults;
             assert!(!faults.is_empty(), "{compression:?}: bit flip in byte {at} goes unnoticed");
             bytes[at] ^= bit;
         }
@@ -89,7 +89,7 @@ fn recovery_leaves_out_a_damaged_chunk_only() {
     let damaged = temp.path().join("damaged.mcap");
     fs::write(&damaged, &bytes).unwrap();
     let to = temp.path().join("saved");
-    let recovery = recover(&damaged, &to, BagOptions::default()).unwrap();
+    let recovery = recover(&damaged, &to, BagOptions::default(), ReadOptions::default()).unwrap();
     assert_eq!(recovery.faults.len(), 1);
     assert!(recovery.faults[0].contains("chunk checksum"), "{}", recovery.faults[0]);
     assert!((80..121).contains(&recovery.summary.messages), "{}", recovery.summary.messages);

@@ -19,7 +19,7 @@ use common::{
     state,
 };
 use swath_bags::{
-    Bag, BagOptions, BagWriter, Topic,
+    Bag, BagOptions, BagWriter, ReadOptions, Topic,
     ops::{recover::recover, validate::validate},
 };
 use swath_ros::graph;
@@ -79,9 +79,9 @@ fn a_killed_writer_loses_no_more_than_the_last_second() {
 
 /// Recovers a killed bag; it is whole up to a second before the kill [ns since 1970].
 fn assert_lost_within_a_second(killed: &Path, saved: &Path, killed_at: u64) {
-    recover(killed, saved, BagOptions::default()).unwrap();
+    recover(killed, saved, BagOptions::default(), ReadOptions::default()).unwrap();
     let killed = killed.display();
-    assert_eq!(validate(saved, None).unwrap().faults, [""; 0], "{killed}");
+    assert_eq!(validate(saved, None, ReadOptions::default()).unwrap().faults, [""; 0], "{killed}");
     let (_, last) = Bag::open(saved).unwrap().time_range().unwrap();
     let lost = killed_at.saturating_sub(last);
     assert!(lost < 1_000_000_000, "{killed} lost the last {lost} ns");

@@ -8,7 +8,7 @@ use std::{fs, path::Path, time::Duration};
 
 use common::{TICK, cdr, state, topic, write_sample};
 use swath_bags::{
-    Bag, BagError, BagOptions, BagWriter, Compression, Filter, Topic, TopicPattern,
+    Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
     ops::{
         cat::cat,
         copy::{filter, merge},
@@ -49,12 +49,12 @@ fn a_filtered_bag_holds_what_was_asked_for_and_validates() {
         until: 59 * TICK,
     };
     let summary = filter(&Bag::open(&whole).unwrap(), &wanted, &part, small_chunks()).unwrap();
-    assert_eq!(summary.messages, 10);
+    assert_eq!((summary.summary.messages, summary.faults), (10, vec![]));
     assert_eq!(contents(&part, &Filter::default()), contents(&whole, &wanted));
     let bag = Bag::open(&part).unwrap();
     assert_eq!(bag.topics().len(), 1);
     assert_eq!(bag.metadata_named("swath_manifest").unwrap()["seed"], "7");
-    let report = validate(&part, None).unwrap();
+    let report = validate(&part, None, ReadOptions::default()).unwrap();
     assert_eq!(report.faults, [""; 0]);
     let again = filter(&bag, &Filter::default(), &part, small_chunks());
     assert!(matches!(again, Err(BagError::Exists { .. })), "nothing is overwritten");
@@ -72,7 +72,7 @@ fn merging_the_halves_gives_the_whole() {
         filter(&whole, &half, &path(name), small_chunks()).unwrap();
     }
     let halves = [path("clock"), path("rest")];
-    merge(&halves, &path("merged"), small_chunks()).unwrap();
+    merge(&halves, &path("merged"), small_chunks(), ReadOptions::default()).unwrap();
     let sorted = |name: &str| {
         let mut all = contents(&path(name), &Filter::default());
         assert!(all.is_sorted_by_key(|(_, _, time, _)| *time));
@@ -80,7 +80,7 @@ fn merging_the_halves_gives_the_whole() {
         all
     };
     assert_eq!(sorted("merged"), sorted("whole"));
-    assert_eq!(validate(&path("merged"), None).unwrap().faults, [""; 0]);
+    assert_eq!(validate(&path("merged"), None, ReadOptions::default()).unwrap().faults, [""; 0]);
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn splitting_by_duration_and_size_loses_nothing() {
     for name in ["duration", "size"] {
         let all = contents(&path(name), &Filter::default());
         assert_eq!(all, contents(&path("one"), &Filter::default()));
-        assert_eq!(validate(&path(name), None).unwrap().faults, [""; 0]);
+        assert_eq!(validate(&path(name), None, ReadOptions::default()).unwrap().faults, [""; 0]);
     }
 }
 
@@ -142,7 +142,7 @@ fn a_lost_message_is_a_fault() {
         bag.write(states, tick * TICK, tick * TICK, &cdr(&state(tick))).unwrap();
     }
     assert_eq!(bag.close().unwrap().lost, 2);
-    let report = validate(&dir, None).unwrap();
+    let report = validate(&dir, None, ReadOptions::default()).unwrap();
     assert_eq!(report.faults, ["/swath/state: 2 of 12 sequence numbers are missing"]);
     assert_eq!(report.warnings, ["the recording lost 2 messages"]);
     assert_eq!(info(&Bag::open(&dir).unwrap()).lost, 2);
@@ -164,7 +164,7 @@ fn validation_finds_what_is_wrong() {
     bag.write(short, 0, 0, &[0, 1, 0, 0, 1]).unwrap();
     bag.write(short, 9 * TICK, 0, &[0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]).unwrap();
     bag.close().unwrap();
-    let report = validate(&dir, Some(TICK)).unwrap();
+    let report = validate(&dir, Some(TICK), ReadOptions::default()).unwrap();
     let expected = [
         "/hash: topic_type_hash \"RIHS01_0000",
         "/schema: schema of rosgraph_msgs/msg/Clock, line 1: type rosgraph_msgs/no is not defined",
@@ -177,7 +177,7 @@ fn validation_finds_what_is_wrong() {
     }
     assert_eq!(report.warnings, ["/unknown: no schema known for rosgraph_msgs/msg/Clock"]);
     fs::write(dir.join("metadata.yaml"), "nonsense").unwrap();
-    assert!(validate(&dir, None).unwrap().faults.iter().any(|f| f.contains("metadata.yaml")));
+    assert!(validate(&dir, None, ReadOptions::default()).unwrap().faults.iter().any(|f| f.contains("metadata.yaml")));
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn cat_prints_json_lines() {
     let topics = TopicPattern::new(&["/swath/state".to_owned()], None, None).unwrap();
     let from_tick_7 = Filter { topics, from: 7 * TICK, ..Filter::default() };
     let mut out = Vec::new();
-    assert_eq!(cat(&bag, &from_tick_7, Some(3), &mut out).unwrap(), 3);
+    assert_eq!(cat(&bag, &from_tick_7, Some(3), &mut out, &mut Vec::new()).unwrap(), 3);
     let lines: Vec<serde_json::Value> =
         out.split(|b| *b == b'\n').filter(|l| !l.is_empty()).map(|l| serde_json::from_slice(l).unwrap()).collect();
     assert_eq!(lines.len(), 3);
@@ -207,7 +207,7 @@ fn recovering_an_undamaged_bag_changes_nothing() {
     let temp = tempfile::tempdir().unwrap();
     let (whole, saved) = (temp.path().join("whole"), temp.path().join("saved"));
     write_sample(&whole, TICKS, BagOptions { max_file_bytes: Some(6_000), ..small_chunks() });
-    let recovery = recover(&whole, &saved, small_chunks()).unwrap();
+    let recovery = recover(&whole, &saved, small_chunks(), ReadOptions::default()).unwrap();
     assert_eq!(recovery.faults, [""; 0]);
     let everything = Filter::default();
     assert_eq!(contents(&saved, &everything), contents(&whole, &everything));

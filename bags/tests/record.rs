@@ -15,7 +15,7 @@ use common::{
     program::{PATIENCE, Program, call, client, node, wait_until},
     stamp, state,
 };
-use swath_bags::{Bag, Filter, ops::validate::validate};
+use swath_bags::{Bag, Filter, ReadOptions, ops::validate::validate};
 use swath_msgs::{
     diagnostic_msgs::{DiagnosticArray, DiagnosticStatus},
     geometry_msgs::{Transform, TransformStamped},
@@ -77,7 +77,7 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     assert!(status.success());
     assert_eq!((&closed["messages"], &closed["lost"]), (&1003.into(), &0.into()));
 
-    let report = validate(&temp.path().join("bag"), None).unwrap();
+    let report = validate(&temp.path().join("bag"), None, ReadOptions::default()).unwrap();
     assert_eq!(report.faults, [""; 0]);
     assert_eq!(report.warnings, ["/foreign: no schema known for foreign_msgs/msg/Thing"]);
     let bag = Bag::open(&temp.path().join("bag")).unwrap();
@@ -126,7 +126,7 @@ fn services_pause_resume_split_and_stop() {
     let bag = Bag::open(&temp.path().join("bag")).unwrap();
     let expected: Vec<u64> = (1..10).chain(20..40).map(|tick| tick * TICK).collect();
     assert_eq!(times(&bag, "/swath/spacecraft/state"), expected);
-    assert_eq!(validate(bag.path(), None).unwrap().faults, [""; 0]);
+    assert_eq!(validate(bag.path(), None, ReadOptions::default()).unwrap().faults, [""; 0]);
 }
 
 /// The worst that the recorder says of itself within some time.
@@ -166,7 +166,7 @@ fn a_full_disk_ends_recording_with_an_alarm_and_a_readable_bag() {
         alarm = alarm.max(worst(&diagnostics));
         alarm == DiagnosticStatus::ERROR
     });
-    let report = validate(&temp.path().join("bag"), None).unwrap();
+    let report = validate(&temp.path().join("bag"), None, ReadOptions::default()).unwrap();
     assert_eq!(report.faults, [""; 0]);
     assert!(report.messages > 100, "{} messages", report.messages);
     assert!(report.warnings[0].starts_with("the recording lost "), "{:?}", report.warnings);

@@ -171,5 +171,6 @@ fn primitive_id(primitive: Primitive) -> u8 {
         Primitive::Bool => 15,
         Primitive::Byte => 16,
         Primitive::String { .. } => 17,
+        Primitive::WString { .. } => 18,
     }
 }

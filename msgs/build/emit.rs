@@ -181,7 +181,7 @@ fn base_type(base: &Base) -> String {
         Primitive::Float32 => "f32",
         Primitive::Float64 => "f64",
         // A package may have a message called String.
-        Primitive::String { .. } => "::std::string::String",
+        Primitive::String { .. } | Primitive::WString { .. } => "::std::string::String",
     }
     .to_owned()
 }
@@ -190,7 +190,9 @@ fn is_copy(catalogue: &Catalogue, message: &Message) -> bool {
     message.fields.iter().all(|field| {
         matches!(field.shape, Shape::Scalar | Shape::Array(_))
             && match &field.base {
-                Base::Primitive(primitive) => !matches!(primitive, Primitive::String { .. }),
+                Base::Primitive(primitive) => {
+                    !matches!(primitive, Primitive::String { .. } | Primitive::WString { .. })
+                }
                 Base::Nested { package, name } => {
                     catalogue.get(&format!("{package}/msg/{name}")).is_some_and(|nested| is_copy(catalogue, nested))
                 }

@@ -1,42 +1,6 @@
 //! What a ROS 2 interface file holds, once parsed.
 
-/// A type that is not made of others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Primitive {
-    Bool,
-    Byte,
-    Char,
-    Int8,
-    Uint8,
-    Int16,
-    Uint16,
-    Int32,
-    Uint32,
-    Int64,
-    Uint64,
-    Float32,
-    Float64,
-    /// A text, with the most bytes it may have.
-    String {
-        bound: Option<usize>,
-    },
-}
-
-/// The type of a field without its array part.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Base {
-    Primitive(Primitive),
-    Nested { package: String, name: String },
-}
-
-/// The array part of a field's type.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
-    Scalar,
-    Array(usize),
-    Bounded(usize),
-    Unbounded,
-}
+pub use crate::definition::{Base, Primitive, Shape};
 
 /// A default or a constant's value.
 #[derive(Clone, Debug, PartialEq)]

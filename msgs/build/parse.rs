@@ -1,8 +1,9 @@
-//! Parser of ROS 2 interface files, `.msg` and `.srv`.
+//! The house rules for interface files on top of the grammar, and values of the types that they have.
 
 use std::collections::BTreeSet;
 
-use crate::model::{Base, Constant, Field, Message, Primitive, Service, Shape, Value};
+use crate::definition::{self, Base, Definition, PLACEHOLDER, Primitive, Shape};
+use crate::model::{Constant, Field, Message, Service, Value};
 
 /// Serde has array implementations up to this length.
 const LONGEST_ARRAY: usize = 32;
@@ -10,192 +11,122 @@ const LONGEST_ARRAY: usize = 32;
 /// Parses a `.msg` file; errors name the line.
 pub fn message(package: &str, name: &str, text: &str) -> Result<Message, String> {
     check_type_name(name)?;
-    let mut message = definition(package, text, 0)?;
-    message.name = name.to_owned();
-    Ok(message)
+    let definition = definition::message(package, text, 1).map_err(|error| error.to_string())?;
+    checked(package, name.to_owned(), "msg", text, definition)
 }
 
 /// Parses a `.srv` file; errors name the line.
 pub fn service(package: &str, name: &str, text: &str) -> Result<Service, String> {
     check_type_name(name)?;
-    let lines: Vec<&str> = text.lines().collect();
-    let mut rules = lines.iter().enumerate().filter(|(_, line)| line.trim() == "---");
-    let (Some((rule, _)), None) = (rules.next(), rules.next()) else {
+    let [request, response] = &definition::parts(text, 1)[..] else {
         return Err("a service needs exactly one line `---`".to_owned());
     };
-    let half = |lines: &[&str], first_line, suffix| {
-        let text: String = lines.iter().flat_map(|line| [line, "\n"]).collect();
-        definition(package, &text, first_line).map(|mut half| {
-            half.name = format!("{name}_{suffix}");
-            half.kind = "srv";
-            half
-        })
+    let half = |(line, text): &(usize, String), suffix| {
+        let definition = definition::message(package, text, *line).map_err(|error| error.to_string())?;
+        checked(package, format!("{name}_{suffix}"), "srv", text, definition)
     };
-    let request = half(&lines[..rule], 0, "Request")?;
-    let response = half(&lines[rule + 1..], rule + 1, "Response")?;
+    let (request, response) = (half(request, "Request")?, half(response, "Response")?);
     Ok(Service { package: package.to_owned(), name: name.to_owned(), doc: request.doc.clone(), request, response })
 }
 
-fn definition(package: &str, text: &str, lines_before: usize) -> Result<Message, String> {
-    let mut message = Message {
-        package: package.to_owned(),
-        name: String::new(),
-        kind: "msg",
-        doc: String::new(),
-        fields: Vec::new(),
-        constants: Vec::new(),
-        text: text.to_owned(),
+/// A definition that keeps the house rules.
+fn checked(
+    package: &str,
+    name: String,
+    kind: &'static str,
+    text: &str,
+    definition: Definition,
+) -> Result<Message, String> {
+    let mut fields = Vec::new();
+    for field in &definition.fields {
+        let checked = checked_field(package, field);
+        fields.push(checked.map_err(|error| format!("line {}: {error}", field.line))?);
+    }
+    let mut constants = Vec::new();
+    for constant in &definition.constants {
+        let checked = checked_constant(package, constant);
+        constants.push(checked.map_err(|error| format!("line {}: {error}", constant.line))?);
+    }
+    check_names(&definition)?;
+    if fields.is_empty() {
+        fields.push(placeholder());
+    }
+    let (package, text) = (package.to_owned(), text.to_owned());
+    Ok(Message { package, name, kind, doc: definition.doc, fields, constants, text })
+}
+
+fn checked_field(package: &str, field: &definition::Field) -> Result<Field, String> {
+    let definition::Field { name, base, shape, doc, .. } = field.clone();
+    check_base(package, &base)?;
+    if let Shape::Array(length) = shape
+        && length > LONGEST_ARRAY
+    {
+        let text = format!("{}[{length}]", base_text(package, &base));
+        return Err(format!("`{text}` is longer than the {LONGEST_ARRAY} elements that are supported"));
+    }
+    check_comment(&name, &doc)?;
+    check_field_name(&name)?;
+    let default = field.default.as_ref().map(|text| default_value(&base, shape, text)).transpose()?;
+    Ok(Field { name, base, shape, default, doc })
+}
+
+fn checked_constant(package: &str, constant: &definition::Constant) -> Result<Constant, String> {
+    let definition::Constant { name, base, shape, value, doc, .. } = constant.clone();
+    check_base(package, &base)?;
+    check_comment(&name, &doc)?;
+    check_constant_name(&name)?;
+    let (Base::Primitive(primitive), Shape::Scalar) = (base, shape) else {
+        return Err(format!("the constant `{name}` is not of a primitive type"));
     };
+    let value = scalar(primitive, &value)?;
+    Ok(Constant { name, primitive, value, doc })
+}
+
+fn check_base(package: &str, base: &Base) -> Result<(), String> {
+    match base {
+        Base::Primitive(Primitive::WString { .. }) => Err("`wstring` is not supported: use `string`".to_owned()),
+        Base::Primitive(_) => Ok(()),
+        Base::Nested { name, .. } => {
+            check_type_name(name).map_err(|_| format!("`{}` is not a type", base_text(package, base)))
+        }
+    }
+}
+
+/// A type as an interface file writes it.
+fn base_text(own: &str, base: &Base) -> String {
+    match base {
+        Base::Nested { package, name } if package == own => name.clone(),
+        Base::Nested { package, name } => format!("{package}/{name}"),
+        Base::Primitive(primitive) => format!("{primitive:?}").to_lowercase(),
+    }
+}
+
+fn check_comment(name: &str, doc: &str) -> Result<(), String> {
+    if doc.is_empty() { Err(format!("`{name}` has no comment that says what it is")) } else { Ok(()) }
+}
+
+/// No name stands twice.
+fn check_names(definition: &Definition) -> Result<(), String> {
+    let fields = definition.fields.iter().map(|field| (field.line, &field.name));
+    let constants = definition.constants.iter().map(|constant| (constant.line, &constant.name));
+    let mut all: Vec<_> = fields.chain(constants).collect();
+    all.sort_unstable();
     let mut names = BTreeSet::new();
-    let mut comment = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let (code, remark) = split_comment(line);
-        let remark = remark.map(|remark| remark.trim().to_owned());
-        let code = code.trim();
-        if code.is_empty() {
-            match remark {
-                Some(remark) => comment.push(remark),
-                None if message.doc.is_empty() && message.fields.is_empty() => {
-                    message.doc = std::mem::take(&mut comment).join(" ");
-                }
-                None => comment.clear(),
-            }
-            continue;
-        }
-        comment.extend(remark);
-        let doc = std::mem::take(&mut comment).join(" ");
-        let name =
-            member(&mut message, code, doc).map_err(|error| format!("line {}: {error}", lines_before + index + 1))?;
-        if !names.insert(name.clone()) {
-            return Err(format!("line {}: `{name}` is defined twice", lines_before + index + 1));
-        }
+    match all.into_iter().find(|(_, name)| !names.insert(*name)) {
+        Some((line, name)) => Err(format!("line {line}: `{name}` is defined twice")),
+        None => Ok(()),
     }
-    if message.fields.is_empty() {
-        message.fields.push(placeholder());
-    }
-    Ok(message)
 }
 
 /// The member that ROS 2 gives to a message without fields.
 fn placeholder() -> Field {
     Field {
-        name: "structure_needs_at_least_one_member".to_owned(),
+        name: PLACEHOLDER.to_owned(),
         base: Base::Primitive(Primitive::Uint8),
         shape: Shape::Scalar,
         default: None,
         doc: "Always 0.".to_owned(),
     }
-}
-
-/// Splits a line at the `#` that opens a comment, which is not inside quotes.
-fn split_comment(line: &str) -> (&str, Option<&str>) {
-    let mut quote = None;
-    for (at, character) in line.char_indices() {
-        match (quote, character) {
-            (None, '#') => return (&line[..at], Some(&line[at + 1..])),
-            (None, '\'' | '"') => quote = Some(character),
-            (Some(open), _) if open == character => quote = None,
-            _ => {}
-        }
-    }
-    (line, None)
-}
-
-/// Parses `TYPE NAME`, `TYPE NAME DEFAULT` or `TYPE NAME=VALUE` and returns the name.
-fn member(message: &mut Message, code: &str, doc: String) -> Result<String, String> {
-    let (type_text, rest) = code.split_once(char::is_whitespace).ok_or_else(|| format!("`{code}` has no name"))?;
-    let (base, shape) = field_type(&message.package, type_text)?;
-    let rest = rest.trim();
-    let name_length = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
-    let (name, tail) = (rest[..name_length].to_owned(), rest[name_length..].trim_start());
-    if doc.is_empty() {
-        return Err(format!("`{name}` has no comment that says what it is"));
-    }
-    if let Some(value_text) = tail.strip_prefix('=') {
-        check_constant_name(&name)?;
-        let (Base::Primitive(primitive), Shape::Scalar) = (base, shape) else {
-            return Err(format!("the constant `{name}` is not of a primitive type"));
-        };
-        let value = scalar(primitive, value_text.trim())?;
-        message.constants.push(Constant { name: name.clone(), primitive, value, doc });
-    } else {
-        check_field_name(&name)?;
-        let default = match tail {
-            "" => None,
-            text => Some(default_value(&base, shape, text)?),
-        };
-        message.fields.push(Field { name: name.clone(), base, shape, default, doc });
-    }
-    Ok(name)
-}
-
-fn field_type(package: &str, text: &str) -> Result<(Base, Shape), String> {
-    let (base_text, shape) = match text.split_once('[') {
-        None => (text, Shape::Scalar),
-        Some((base, bracket)) => (base, array_shape(text, bracket)?),
-    };
-    let base = match primitive(base_text)? {
-        Some(primitive) => Base::Primitive(primitive),
-        None => nested(package, base_text)?,
-    };
-    Ok((base, shape))
-}
-
-fn array_shape(text: &str, bracket: &str) -> Result<Shape, String> {
-    let size = bracket.strip_suffix(']').ok_or_else(|| format!("`{text}` is not a type"))?;
-    let positive = |digits: &str| match digits.parse::<usize>() {
-        Ok(size) if size > 0 => Ok(size),
-        _ => Err(format!("`{text}` has no positive array size")),
-    };
-    match size.strip_prefix("<=") {
-        _ if size.is_empty() => Ok(Shape::Unbounded),
-        Some(bound) => Ok(Shape::Bounded(positive(bound)?)),
-        None => match positive(size)? {
-            length if length > LONGEST_ARRAY => {
-                Err(format!("`{text}` is longer than the {LONGEST_ARRAY} elements that are supported"))
-            }
-            length => Ok(Shape::Array(length)),
-        },
-    }
-}
-
-fn primitive(text: &str) -> Result<Option<Primitive>, String> {
-    Ok(Some(match text {
-        "bool" => Primitive::Bool,
-        "byte" => Primitive::Byte,
-        "char" => Primitive::Char,
-        "int8" => Primitive::Int8,
-        "uint8" => Primitive::Uint8,
-        "int16" => Primitive::Int16,
-        "uint16" => Primitive::Uint16,
-        "int32" => Primitive::Int32,
-        "uint32" => Primitive::Uint32,
-        "int64" => Primitive::Int64,
-        "uint64" => Primitive::Uint64,
-        "float32" => Primitive::Float32,
-        "float64" => Primitive::Float64,
-        "string" => Primitive::String { bound: None },
-        _ if text.starts_with("wstring") => {
-            return Err("`wstring` is not supported: use `string`".to_owned());
-        }
-        _ => match text.strip_prefix("string<=") {
-            Some(bound) => Primitive::String {
-                bound: Some(bound.parse().map_err(|_| format!("`{text}` has no bound that is a number"))?),
-            },
-            None => return Ok(None),
-        },
-    }))
-}
-
-fn nested(package: &str, text: &str) -> Result<Base, String> {
-    let parts: Vec<&str> = text.split('/').collect();
-    let (package, name) = match parts[..] {
-        [name] => (package, name),
-        [package, name] | [package, "msg", name] => (package, name),
-        _ => return Err(format!("`{text}` is not a type")),
-    };
-    check_type_name(name)?;
-    Ok(Base::Nested { package: package.to_owned(), name: name.to_owned() })
 }
 
 fn default_value(base: &Base, shape: Shape, text: &str) -> Result<Value, String> {
@@ -241,7 +172,7 @@ fn scalar(primitive: Primitive, text: &str) -> Result<Value, String> {
                 _ => Err(refused()),
             };
         }
-        Primitive::String { bound } => {
+        Primitive::String { bound } | Primitive::WString { bound } => {
             let text = unquoted(text);
             return match bound {
                 Some(bound) if text.len() > bound => Err(refused()),

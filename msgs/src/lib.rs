@@ -5,6 +5,7 @@
 //! are associated constants of its type.
 
 mod bounded;
+pub mod definition;
 
 use std::fmt::Debug;
 

@@ -12,6 +12,7 @@ mod parse;
 
 use describe::Catalogue;
 use model::{Base, Primitive, Shape, Value};
+use swath_msgs::definition;
 
 fn catalogue(files: &[(&str, &str, &str)]) -> Catalogue {
     files

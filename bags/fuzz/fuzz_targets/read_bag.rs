@@ -6,7 +6,7 @@ use std::{fs, path::PathBuf, sync::OnceLock};
 use libfuzzer_sys::fuzz_target;
 use swath_bags::{
     Bag, BagOptions, Filter,
-    ops::{cat::cat, info::info, recover::recover, validate::validate},
+    ReadOptions, ops::{cat::cat, info::info, recover::recover, validate::validate},
 };
 
 /// A folder in memory: the reader takes files.
@@ -22,12 +22,12 @@ fn folder() -> &'static PathBuf {
 fuzz_target!(|data: &[u8]| {
     let path = folder().join("bag.mcap");
     fs::write(&path, data).expect("no room in memory");
-    let _ = validate(&path, None);
+    let _ = validate(&path, None, ReadOptions::default());
     if let Ok(bag) = Bag::open(&path) {
         let _ = info(&bag).to_string();
-        let _ = cat(&bag, &Filter::default(), Some(1000), &mut std::io::sink());
+        let _ = cat(&bag, &Filter::default(), Some(1000), &mut std::io::sink(), &mut Vec::new());
     }
     let saved = folder().join("saved");
-    let _ = recover(&path, &saved, BagOptions::default());
+    let _ = recover(&path, &saved, BagOptions::default(), ReadOptions::default());
     let _ = fs::remove_dir_all(&saved);
 });

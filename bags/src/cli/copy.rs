@@ -4,12 +4,12 @@ use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 
-use super::{print, print_json};
+use super::{ReadArgs, WITH_LOSS, done, print, print_json};
 use crate::{
     error::{BagError, Result},
     file::chunk::Compression,
     ops::{
-        copy::{filter, merge},
+        copy::{Copied, filter, merge},
         recover::recover,
     },
     reader::{Bag, Filter, TopicPattern},
@@ -117,11 +117,13 @@ pub struct FilterArgs {
     selection: Selection,
     #[command(flatten)]
     shape: Shape,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl FilterArgs {
     pub(super) fn run(self) -> Result<ExitCode> {
-        let bag = Bag::open(&self.bag)?;
+        let bag = Bag::open_all(&[self.bag], self.read.options())?;
         let wanted = self.selection.filter(&bag)?;
         report(&filter(&bag, &wanted, &self.output, self.shape.options())?)
     }
@@ -139,18 +141,20 @@ pub struct MergeArgs {
     output: PathBuf,
     #[command(flatten)]
     shape: Shape,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl MergeArgs {
     pub(super) fn run(self) -> Result<ExitCode> {
-        report(&merge(&self.bags, &self.output, self.shape.options())?)
+        report(&merge(&self.bags, &self.output, self.shape.options(), self.read.options())?)
     }
 }
 
-fn report(summary: &BagSummary) -> Result<ExitCode> {
-    let BagSummary { messages, files, bytes, .. } = summary;
+fn report(copied: &Copied) -> Result<ExitCode> {
+    let BagSummary { messages, files, bytes, .. } = copied.summary;
     print(&format!("{messages} messages in {files} files, {bytes} bytes\n"))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(done(&copied.faults))
 }
 
 /// Arguments of `recover`.
@@ -167,11 +171,13 @@ pub struct RecoverArgs {
     json: bool,
     #[command(flatten)]
     shape: Shape,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl RecoverArgs {
     pub(super) fn run(self) -> Result<ExitCode> {
-        let recovery = recover(&self.bag, &self.output, self.shape.options())?;
+        let recovery = recover(&self.bag, &self.output, self.shape.options(), self.read.options())?;
         let messages = recovery.summary.messages;
         if self.json {
             print_json(&serde_json::json!({ "messages": messages, "faults": recovery.faults }))?;
@@ -182,6 +188,6 @@ impl RecoverArgs {
             }
             print(&(text + &format!("{messages} messages saved\n")))?;
         }
-        Ok(ExitCode::SUCCESS)
+        Ok(if recovery.faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(WITH_LOSS) })
     }
 }

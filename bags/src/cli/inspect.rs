@@ -4,10 +4,14 @@ use std::{io, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 
-use super::{copy::Selection, print, print_json};
+use super::{ReadArgs, copy::Selection, done, print, print_json};
 use crate::{
     error::Result,
-    ops::{cat::cat, info::info, validate::validate},
+    ops::{
+        cat::cat,
+        info::{info, info_in_detail},
+        validate::validate,
+    },
     reader::Bag,
 };
 
@@ -17,19 +21,25 @@ use crate::{
 pub struct InfoArgs {
     /// Bag directory or .mcap file
     bag: PathBuf,
+    /// Tell more: sizes by topic, QoS, type hashes, requests and responses of services; reads every message
+    #[arg(short, long)]
+    verbose: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl InfoArgs {
     pub(super) fn run(self) -> Result<ExitCode> {
-        let info = info(&Bag::open(&self.bag)?);
+        let bag = Bag::open_all(&[self.bag], self.read.options())?;
+        let info = if self.verbose { info_in_detail(&bag)? } else { info(&bag) };
         match self.json {
             true => print_json(&info)?,
             false => print(&info.to_string())?,
         }
-        Ok(ExitCode::SUCCESS)
+        Ok(done(bag.faults()))
     }
 }
 
@@ -46,15 +56,18 @@ pub struct CatArgs {
     /// Stop after this many messages
     #[arg(short = 'n', long)]
     limit: Option<u64>,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl CatArgs {
     pub(super) fn run(self) -> Result<ExitCode> {
-        let bag = Bag::open(&self.bag)?;
+        let bag = Bag::open_all(&[self.bag], self.read.options())?;
         let filter = self.selection.filter(&bag)?;
         let mut out = io::BufWriter::new(io::stdout().lock());
-        cat(&bag, &filter, self.limit, &mut out)?;
-        Ok(ExitCode::SUCCESS)
+        let mut faults = bag.faults().to_vec();
+        cat(&bag, &filter, self.limit, &mut out, &mut faults)?;
+        Ok(done(&faults))
     }
 }
 
@@ -70,11 +83,13 @@ pub struct ValidateArgs {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl ValidateArgs {
     pub(super) fn run(self) -> Result<ExitCode> {
-        let report = validate(&self.bag, self.max_gap)?;
+        let report = validate(&self.bag, self.max_gap, self.read.options())?;
         let code = if report.faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
         if self.json {
             print_json(&report)?;

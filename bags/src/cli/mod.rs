@@ -10,11 +10,44 @@ use std::{
     process::ExitCode,
 };
 
-use clap::Subcommand;
+use clap::{Args, Subcommand};
 pub use record::{MANIFEST, MANIFEST_TEXT};
 use swath_ros::RosArgs;
 
-use crate::error::{BagError, Result};
+use crate::{
+    error::{BagError, Result},
+    file::source::{MAX_RECORD_BYTES, ReadOptions},
+};
+
+/// The exit code of a command that has done its work, with loss.
+const WITH_LOSS: u8 = 3;
+
+/// How bags are read.
+#[derive(Debug, Args)]
+struct ReadArgs {
+    /// Largest message, and largest chunk once unpacked, that is read into memory [bytes]
+    #[arg(
+        long,
+        value_name = "BYTES",
+        default_value_t = MAX_RECORD_BYTES,
+        value_parser = clap::value_parser!(u64).range(1024..=u64::from(u32::MAX))
+    )]
+    max_record_size: u64,
+}
+
+impl ReadArgs {
+    fn options(&self) -> ReadOptions {
+        ReadOptions { max_record_bytes: self.max_record_size }
+    }
+}
+
+/// The exit code of a command that has done its work; tells what was lost on the way.
+fn done(faults: &[String]) -> ExitCode {
+    for fault in faults {
+        eprintln!("warning: {fault}");
+    }
+    if faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(WITH_LOSS) }
+}
 
 /// The commands of `swath-bag` that need no simulation.
 #[derive(Debug, Subcommand)]

@@ -12,7 +12,7 @@ use clap::Args;
 use serde_json::json;
 use swath_ros::{RosArgs, Shutdown};
 
-use super::{copy::seconds, print_json};
+use super::{ReadArgs, copy::seconds, print_json};
 use crate::{
     error::{BagError, Result, chain},
     play::{PlayOptions, Player},
@@ -75,6 +75,8 @@ pub struct PlayArgs {
     /// Leave the terminal's keys alone
     #[arg(long)]
     disable_keyboard_controls: bool,
+    #[command(flatten)]
+    read: ReadArgs,
 }
 
 impl PlayArgs {
@@ -104,6 +106,7 @@ impl PlayArgs {
         let duration_end = self.playback_duration.map(|d| self.start_offset.saturating_add(d));
         Ok(PlayOptions {
             bags: self.bags,
+            read: self.read.options(),
             topics: TopicPattern::new(&self.topics, self.regex.as_deref(), self.exclude.as_deref())?,
             rate: self.rate,
             repeat: self.repeat,
@@ -142,7 +145,7 @@ fn renaming(text: &str) -> Result<(String, String), String> {
 
 fn overrides(path: &Path) -> Result<BTreeMap<String, QosOverride>> {
     let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
-    serde_yaml_ng::from_str(&text).map_err(|e| BagError::Option {
+    yaml_serde::from_str(&text).map_err(|e| BagError::Option {
         option: "--qos-profile-overrides-path",
         reason: format!("{}: {e}", path.display()),
     })

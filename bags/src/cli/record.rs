@@ -8,13 +8,13 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
+use chrono::DateTime;
 use clap::Args;
 use serde_json::{Value, json};
 use swath_ros::{RosArgs, Shutdown};
 
 use super::{copy::Shape, print_json};
 use crate::{
-    date::file_name_date,
     error::{BagError, Result},
     reader::TopicPattern,
     record::{RecordClock, RecordOptions, Recorder},
@@ -139,7 +139,8 @@ impl RecordArgs {
 
 fn default_output() -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    format!("rosbag2_{}", file_name_date(now.as_secs())).into()
+    let now = DateTime::from_timestamp(now.as_secs().cast_signed(), 0).unwrap_or_default();
+    now.format("rosbag2_%Y_%m_%d-%H_%M_%S").to_string().into()
 }
 
 fn pair(text: &str) -> Result<(String, String), String> {

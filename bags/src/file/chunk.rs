@@ -2,10 +2,9 @@
 
 use std::{io::Write, str::FromStr, time::Instant};
 
-use super::{
-    record,
-    records::{MessageHeader, op},
-};
+use mcap::records::{MessageHeader, op};
+
+use super::record;
 use crate::error::BagError;
 
 /// How chunks are compressed.

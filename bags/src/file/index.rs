@@ -1,22 +1,87 @@
-//! The index of one MCAP file: topics, chunks and counts, from its summary or by a walk through it.
+//! The index of one file of a bag: topics, chunks and counts, from its summary or by a walk through it.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+    sync::Arc,
+};
+
+use mcap::{
+    MAGIC,
+    records::{AttachmentHeader, Channel, ChunkHeader, Metadata, Record, op},
+};
 
 use super::{
-    record::{FOOTER_LEN, PREFIX_LEN, Records},
-    records::{self, Body, Chunk, MAGIC, Schema, op},
-    scan::{Place, Places, Source},
+    record::{self, Records, misplaced},
+    source::Source,
+    sqlite::{Rows, Sqlite},
     unpack::Unpacker,
+    walk::{Place, Walk},
 };
-use crate::error::Result;
+use crate::error::{BagError, Result};
 
 /// Messages of a run of loose records (outside chunks) that are read at a time [bytes].
 const LOOSE_BYTES: u64 = 1 << 20;
 
-/// Where messages lie: a chunk, or a run of message records outside chunks.
+/// Where the bytes of a file come from.
+#[derive(Debug, Clone)]
+pub(crate) enum Storage {
+    /// An MCAP file.
+    Mcap(Arc<Source>),
+    /// A SQLite file of rosbag2.
+    Sqlite(Arc<Sqlite>),
+}
+
+impl Storage {
+    pub(crate) fn path(&self) -> &Path {
+        match self {
+            Self::Mcap(source) => &source.path,
+            Self::Sqlite(sqlite) => sqlite.path(),
+        }
+    }
+
+    /// Length of the file [bytes].
+    pub(crate) fn len(&self) -> u64 {
+        match self {
+            Self::Mcap(source) => source.len,
+            Self::Sqlite(sqlite) => sqlite.len(),
+        }
+    }
+
+    /// Largest record that is read [bytes].
+    pub(crate) fn limit(&self) -> u64 {
+        match self {
+            Self::Mcap(source) => source.limit,
+            Self::Sqlite(sqlite) => sqlite.limit(),
+        }
+    }
+
+    /// The error of something larger than what is read.
+    pub(crate) fn too_large(&self, offset: u64, what: &'static str, bytes: u64) -> BagError {
+        BagError::TooLarge { path: self.path().to_owned(), offset, what, bytes, limit: self.limit() }
+    }
+
+    /// An error at an offset of this file.
+    pub(crate) fn corrupt(&self, offset: u64, reason: impl Into<String>) -> BagError {
+        BagError::Corrupt { path: self.path().to_owned(), offset, reason: reason.into() }
+    }
+}
+
+/// What a run of messages is stored as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A chunk.
+    Chunk,
+    /// Message records outside chunks, one behind the other.
+    Loose,
+    /// Rows of a table.
+    Rows(Rows),
+}
+
+/// Where messages lie that are read in one go.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ChunkRef {
-    /// Offset of the chunk's record, or of the run.
+    /// Offset of the chunk's record, or of the run; for rows, their number.
     pub offset: u64,
     /// Length, prefix included.
     pub len: u64,
@@ -24,20 +89,42 @@ pub(crate) struct ChunkRef {
     pub start: u64,
     /// Latest log time [ns].
     pub end: u64,
-    /// Whether it is a run of loose records.
-    pub loose: bool,
+    /// How it is stored.
+    pub kind: Kind,
+    /// Channels that have messages here; `None` when the index does not tell.
+    pub channels: Option<Vec<u16>>,
+}
+
+/// A schema as the file holds it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Schema {
+    pub name: String,
+    pub encoding: String,
+    pub data: Arc<[u8]>,
+}
+
+/// An attachment's header, and where its record is.
+#[derive(Debug, Clone)]
+pub(crate) struct AttachmentRef {
+    pub header: AttachmentHeader,
+    /// Length of its data [bytes].
+    pub data_len: u64,
+    /// Offset in the file of the end of its data, where its checksum is.
+    pub data_end: u64,
+    pub place: Place,
 }
 
 /// All that is known of one file before its messages are read.
 #[derive(Debug)]
 pub(crate) struct FileIndex {
-    pub source: Arc<Source>,
+    pub storage: Storage,
     pub profile: String,
     pub library: String,
     pub schemas: BTreeMap<u16, Schema>,
-    pub channels: BTreeMap<u16, records::Channel>,
+    pub channels: BTreeMap<u16, Channel>,
     pub chunks: Vec<ChunkRef>,
-    pub metadata: Vec<records::Metadata>,
+    pub metadata: Vec<Metadata>,
+    pub attachments: Vec<AttachmentRef>,
     /// Messages by channel.
     pub counts: BTreeMap<u16, u64>,
     /// Compressions in use, with the number of chunks.
@@ -45,41 +132,53 @@ pub(crate) struct FileIndex {
 }
 
 impl FileIndex {
-    /// Opens a file and reads its index.
+    /// Reads the index of an MCAP file.
     ///
     /// # Errors
-    /// [`crate::BagError::Corrupt`] when the file is no MCAP file, has lost its end, or contradicts itself.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
-        let mut index = Self::start(Source::open(path)?)?;
-        let footer = index.read_footer()?;
-        if footer.summary_start == 0 || !index.read_summary(&footer)? {
-            index.walk()?;
+    /// [`BagError::Corrupt`] when the file is no MCAP file, has lost its end, or contradicts itself.
+    pub(crate) fn open(source: Source) -> Result<Self> {
+        let source = Arc::new(source);
+        let mut index = Self::start(&source)?;
+        if !index.read_summary(&source)? {
+            index = Self::start(&source)?;
+            index.walk(&source)?;
         }
         Ok(index)
     }
 
     /// An index that knows the header only.
-    pub(crate) fn start(source: Source) -> Result<Self> {
+    pub(crate) fn start(source: &Arc<Source>) -> Result<Self> {
+        let mut magic = [0; MAGIC.len()];
+        if source.len >= magic.len() as u64 {
+            source.read_at(0, &mut magic)?;
+        }
+        if magic != *MAGIC {
+            return Err(source.corrupt(0, "no MCAP file: it does not start with MCAP's magic"));
+        }
+        let mut walk = Walk::whole(source);
         let mut body = Vec::new();
-        let first = Places::new(&source).next().transpose()?;
-        let mut index = Self::empty(source);
-        if let Some(place) = first.filter(|place| place.opcode == op::HEADER) {
-            place.read_body(&index.source, &mut body)?;
-            index.add(place, &body)?;
+        if let Some(place) = walk.next().transpose()?
+            && place.opcode == op::HEADER
+        {
+            walk.read_body(place, &mut body)?;
+            let mut index = Self::empty(Storage::Mcap(Arc::clone(source)));
+            index.add(source, place, &body)?;
             return Ok(index);
         }
-        Err(index.source.corrupt(8, "the first record is no header"))
+        Err(source.corrupt(8, "the first record is no header"))
     }
 
-    fn empty(source: Source) -> Self {
+    /// An index that knows nothing.
+    pub(crate) fn empty(storage: Storage) -> Self {
         Self {
-            source: Arc::new(source),
+            storage,
             profile: String::new(),
             library: String::new(),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             chunks: Vec::new(),
             metadata: Vec::new(),
+            attachments: Vec::new(),
             counts: BTreeMap::new(),
             compressions: BTreeMap::new(),
         }
@@ -90,223 +189,166 @@ impl FileIndex {
         self.counts.values().fold(0, |sum, n| sum.saturating_add(*n))
     }
 
-    fn read_footer(&self) -> Result<records::Footer> {
-        let len = self.source.len;
-        let missing = "the file's end is missing, it was not closed or was cut off: recover it";
-        let Some(at) = len.checked_sub(FOOTER_LEN) else {
-            return Err(self.source.corrupt(len, missing));
-        };
-        let mut tail = [0; FOOTER_LEN as usize];
-        self.source.read_at(at, &mut tail)?;
-        let (record, magic) = tail.split_at(tail.len() - MAGIC.len());
-        match (Records::new(record).next(), magic == MAGIC) {
-            (Some(Ok((0, op::FOOTER, body))), true) => self.parse(at, body),
-            _ => Err(self.source.corrupt(len, missing)),
-        }
-    }
-
-    /// Reads the summary section; `false` when it does not tell where the messages are.
-    fn read_summary(&mut self, footer: &records::Footer) -> Result<bool> {
-        let start = footer.summary_start;
-        let end = self.source.len - FOOTER_LEN;
-        if start < MAGIC.len() as u64 || start > end {
-            let reason = format!("summary said to start at {start}, outside of the file");
-            return Err(self.source.corrupt(end, reason));
-        }
-        let mut section = Vec::new();
-        // The checksum covers the footer up to the checksum itself.
-        self.source.read_vec(start, end - start + PREFIX_LEN as u64 + 16, &mut section)?;
-        let crc = crc32fast::hash(&section);
-        if footer.summary_crc != 0 && footer.summary_crc != crc {
-            let reason = format!("summary checksum is {crc:08x}, not {:08x}", footer.summary_crc);
-            return Err(self.source.corrupt(start, reason));
-        }
-        let mut statistics = None;
-        for item in Records::new(&section[..(end - start) as usize]) {
-            let (at, opcode, body) = item.map_err(|(at, reason)| self.source.corrupt(start + at as u64, reason))?;
-            let offset = start + at as u64;
-            match opcode {
-                op::STATISTICS => statistics = Some(self.parse::<records::Statistics>(offset, body)?),
-                op::CHUNK_INDEX => self.add_chunk_index(offset, &self.parse(offset, body)?)?,
-                op::METADATA_INDEX => self.read_metadata(&self.parse(offset, body)?)?,
-                _ => self.add(Place { offset, opcode, body_len: body.len() as u64 }, body)?,
-            }
-        }
-        let Some(statistics) = statistics else {
-            return Ok(self.forget());
-        };
-        if self.chunks.is_empty() && statistics.message_count > 0 {
-            return Ok(self.forget());
-        }
-        self.counts = statistics.channel_message_counts;
-        Ok(true)
-    }
-
-    /// Drops what an insufficient summary told, for the walk to find out.
-    fn forget(&mut self) -> bool {
-        self.chunks.clear();
-        self.metadata.clear();
-        self.compressions.clear();
-        false
-    }
-
-    fn parse<T: Body>(&self, offset: u64, body: &[u8]) -> Result<T> {
-        T::parse(body).map_err(|reason| self.source.corrupt(offset, reason))
-    }
-
-    fn add_chunk_index(&mut self, offset: u64, chunk: &records::ChunkIndex) -> Result<()> {
-        let (start, len) = (chunk.chunk_start_offset, chunk.chunk_length);
-        if start.checked_add(len).is_none_or(|end| end > self.source.len) {
-            let reason = format!("chunk said to lie at {start}, {len} bytes long: past the end");
-            return Err(self.source.corrupt(offset, reason));
-        }
-        let (from, to) = (chunk.message_start_time, chunk.message_end_time);
-        self.chunks.push(ChunkRef { offset: start, len, start: from, end: to, loose: false });
-        *self.compressions.entry(chunk.compression.clone()).or_insert(0) += 1;
-        Ok(())
-    }
-
-    fn read_metadata(&mut self, index: &records::MetadataIndex) -> Result<()> {
-        let mut body = Vec::new();
-        self.source.read_vec(index.offset, index.length, &mut body)?;
-        let record = Records::new(&body).next();
-        let Some(Ok((0, op::METADATA, body))) = record else {
-            let reason = format!("no metadata record {:?} here", index.name);
-            return Err(self.source.corrupt(index.offset, reason));
-        };
-        self.add(Place { offset: index.offset, opcode: op::METADATA, body_len: 0 }, body)
-    }
-
     /// Takes in a header, schema, channel or metadata record; ignores others.
-    pub(crate) fn add(&mut self, place: Place, body: &[u8]) -> Result<()> {
-        match place.opcode {
-            op::HEADER => {
-                let header: records::Header = self.parse(place.offset, body)?;
-                (self.profile, self.library) = (header.profile, header.library);
+    ///
+    /// Of two records for one number the first counts, which the messages before the second mean.
+    pub(crate) fn add(&mut self, source: &Source, place: Place, body: &[u8]) -> Result<()> {
+        if !matches!(place.opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA) {
+            return Ok(());
+        }
+        match record::parse(place.opcode, body).map_err(|reason| source.corrupt(place.offset, reason))? {
+            Record::Header(header) => (self.profile, self.library) = (header.profile, header.library),
+            Record::Schema { header, data } => {
+                let schema = || Schema { name: header.name, encoding: header.encoding, data: data.as_ref().into() };
+                self.schemas.entry(header.id).or_insert_with(schema);
             }
-            op::SCHEMA => {
-                let schema: Schema = self.parse(place.offset, body)?;
-                self.schemas.insert(schema.id, schema);
+            Record::Channel(channel) => {
+                self.channels.entry(channel.id).or_insert(channel);
             }
-            op::CHANNEL => {
-                let channel: records::Channel = self.parse(place.offset, body)?;
-                self.channels.insert(channel.id, channel);
-            }
-            op::METADATA => self.metadata.push(self.parse(place.offset, body)?),
+            Record::Metadata(metadata) => self.metadata.push(metadata),
             _ => {}
         }
         Ok(())
     }
 
+    /// Takes in an attachment without reading its data.
+    pub(crate) fn add_attachment(&mut self, source: &Source, place: Place) -> Result<()> {
+        let corrupt = |reason| source.corrupt(place.offset, reason);
+        // Names of more than 64 KiB are no names.
+        let mut start = Vec::new();
+        source.read_vec(place.body(), place.body_len.min(64 << 10), &mut start)?;
+        let (header, data_len, header_len) = record::attachment_header(&start).map_err(corrupt)?;
+        let room = place.body_len.checked_sub(header_len + 4);
+        if room.is_none_or(|room| data_len > room) {
+            return Err(corrupt(format!("attachment of {data_len} bytes in a record of {}", place.body_len)));
+        }
+        let data_end = place.body() + header_len + data_len;
+        self.attachments.push(AttachmentRef { header, data_len, data_end, place });
+        Ok(())
+    }
+
     /// Builds the index from the records themselves, up to the data section's end.
-    fn walk(&mut self) -> Result<()> {
-        let source = Arc::clone(&self.source);
+    fn walk(&mut self, source: &Arc<Source>) -> Result<()> {
         let mut unpacker = Unpacker::default();
         let (mut body, mut data) = (Vec::new(), Vec::new());
-        for place in Places::new(&source) {
-            let place = place?;
+        let mut walk = Walk::whole(source);
+        while let Some(place) = walk.next().transpose()? {
             match place.opcode {
-                op::DATA_END => break,
-                op::ATTACHMENT | op::MESSAGE_INDEX => continue,
-                _ => place.read_body(&source, &mut body)?,
-            }
-            match place.opcode {
+                op::DATA_END | op::FOOTER => break,
+                op::ATTACHMENT => self.add_attachment(source, place)?,
                 op::CHUNK => {
-                    let chunk = unpack(&source, place, &body, &mut unpacker, &mut data)?;
-                    self.add_chunk(place, &chunk, &data)?;
+                    walk.read_body(place, &mut body)?;
+                    let header = unpack(source, place.offset, &body, &mut unpacker, &mut data)?;
+                    self.add_chunk(source, place, &header, &data)?;
                 }
-                op::MESSAGE => self.add_loose(place, &body)?,
-                _ => self.add(place, &body)?,
+                op::MESSAGE => self.add_loose(source, place)?,
+                op::SCHEMA | op::CHANNEL | op::METADATA => {
+                    walk.read_body(place, &mut body)?;
+                    self.add(source, place, &body)?;
+                }
+                _ => {}
             }
         }
         Ok(())
     }
 
-    /// Takes in a chunk whose records are in `data`.
-    pub(crate) fn add_chunk(&mut self, place: Place, chunk: &Chunk<'_>, data: &[u8]) -> Result<()> {
+    /// Takes in a chunk whose records are in `data`: definitions, counts, and the chunk if it has messages.
+    fn add_chunk(&mut self, source: &Source, place: Place, header: &ChunkHeader, data: &[u8]) -> Result<()> {
+        let in_chunk =
+            |(at, reason): (usize, String)| source.corrupt(place.offset, format!("chunk, byte {at}: {reason}"));
+        let mut channels = BTreeSet::new();
+        let (mut start, mut end) = (u64::MAX, 0);
         for item in Records::new(data) {
-            let (at, opcode, body) =
-                item.map_err(|(at, reason)| self.source.corrupt(place.offset, format!("chunk, byte {at}: {reason}")))?;
-            match opcode {
-                op::MESSAGE => {
-                    let message = message_header(body)
-                        .map_err(|reason| self.source.corrupt(place.offset, format!("chunk, byte {at}: {reason}")))?;
-                    *self.counts.entry(message.channel_id).or_insert(0) += 1;
-                }
-                _ => self.add(Place { opcode, ..place }, body)?,
+            let (at, opcode, body) = item.map_err(in_chunk)?;
+            if opcode == op::MESSAGE {
+                let (message, _) = record::message(body).map_err(|reason| in_chunk((at, reason)))?;
+                *self.counts.entry(message.channel_id).or_insert(0) += 1;
+                channels.insert(message.channel_id);
+                (start, end) = (start.min(message.log_time), end.max(message.log_time));
+            } else {
+                self.add(source, Place { opcode, ..place }, body)?;
             }
         }
-        let len = place.end() - place.offset;
-        let (start, end) = (chunk.message_start_time, chunk.message_end_time);
-        self.chunks.push(ChunkRef { offset: place.offset, len, start, end, loose: false });
-        *self.compressions.entry(chunk.compression.to_string()).or_insert(0) += 1;
+        *self.compressions.entry(header.compression.clone()).or_insert(0) += 1;
+        if !channels.is_empty() {
+            let (offset, len) = (place.offset, place.end() - place.offset);
+            let channels = Some(channels.into_iter().collect());
+            self.chunks.push(ChunkRef { offset, len, start, end, kind: Kind::Chunk, channels });
+        }
         Ok(())
     }
 
     /// Takes in a message outside chunks: it joins the run before it, or starts one.
-    fn add_loose(&mut self, place: Place, body: &[u8]) -> Result<()> {
-        let message = message_header(body).map_err(|r| self.source.corrupt(place.offset, r))?;
+    pub(crate) fn add_loose(&mut self, source: &Source, place: Place) -> Result<()> {
+        let mut body = [0; record::MESSAGE_HEADER_LEN];
+        let len = body.len().min(usize::try_from(place.body_len).unwrap_or(usize::MAX));
+        source.read_at(place.body(), &mut body[..len])?;
+        let (message, _) = record::message(&body[..len]).map_err(|reason| source.corrupt(place.offset, reason))?;
         *self.counts.entry(message.channel_id).or_insert(0) += 1;
         let time = message.log_time;
         match self.chunks.last_mut() {
-            Some(run) if run.loose && run.offset + run.len == place.offset && run.len < LOOSE_BYTES => {
+            Some(run) if run.kind == Kind::Loose && run.offset + run.len == place.offset && run.len < LOOSE_BYTES => {
                 run.len = place.end() - run.offset;
                 (run.start, run.end) = (run.start.min(time), run.end.max(time));
+                if let Some(channels) = run.channels.as_mut().filter(|ids| !ids.contains(&message.channel_id)) {
+                    channels.push(message.channel_id);
+                }
             }
             _ => {
-                let len = place.end() - place.offset;
-                let offset = place.offset;
-                self.chunks.push(ChunkRef { offset, len, start: time, end: time, loose: true });
+                let (offset, len) = (place.offset, place.end() - place.offset);
+                let channels = Some(vec![message.channel_id]);
+                self.chunks.push(ChunkRef { offset, len, start: time, end: time, kind: Kind::Loose, channels });
             }
         }
         Ok(())
     }
+
+    /// Reads the message records of a chunk, of a run of loose ones, or made of rows, into `data`.
+    pub(crate) fn load(
+        &self,
+        chunk: &ChunkRef,
+        unpacker: &mut Unpacker,
+        packed: &mut Vec<u8>,
+        data: &mut Vec<u8>,
+    ) -> Result<()> {
+        match (&self.storage, chunk.kind) {
+            (Storage::Sqlite(sqlite), Kind::Rows(rows)) => sqlite.load(rows, data),
+            (Storage::Mcap(source), Kind::Loose) => source.read_vec(chunk.offset, chunk.len, data),
+            (Storage::Mcap(source), Kind::Chunk) => load_chunk(source, chunk, unpacker, packed, data).map(|_| ()),
+            _ => Err(self.storage.corrupt(chunk.offset, "no such messages in a file of this kind")),
+        }
+    }
 }
 
-/// Reads the messages' records of a chunk, or of a run of loose ones, into `data`.
-pub(crate) fn load(
+/// Reads and unpacks a chunk that the index speaks of.
+pub(super) fn load_chunk(
     source: &Source,
     chunk: &ChunkRef,
     unpacker: &mut Unpacker,
     packed: &mut Vec<u8>,
     data: &mut Vec<u8>,
-) -> Result<()> {
-    if chunk.loose {
-        return source.read_vec(chunk.offset, chunk.len, data);
-    }
+) -> Result<ChunkHeader> {
     source.read_vec(chunk.offset, chunk.len, packed)?;
     let Some(Ok((0, op::CHUNK, body))) = Records::new(packed).next() else {
         return Err(source.corrupt(chunk.offset, "no chunk here, the index says there is one"));
     };
-    let place = Place { offset: chunk.offset, opcode: op::CHUNK, body_len: body.len() as u64 };
-    unpack(source, place, body, unpacker, data).map(|_| ())
+    unpack(source, chunk.offset, body, unpacker, data)
 }
 
-/// Unpacks the body of a chunk record into `data`.
-pub(crate) fn unpack<'b>(
+/// Unpacks the body of the chunk record at an offset into `data`.
+pub(crate) fn unpack(
     source: &Source,
-    place: Place,
-    body: &'b [u8],
+    offset: u64,
+    body: &[u8],
     unpacker: &mut Unpacker,
     data: &mut Vec<u8>,
-) -> Result<Chunk<'b>> {
-    let corrupt = |reason: String| source.corrupt(place.offset, reason);
-    let chunk = Chunk::parse(body).map_err(corrupt)?;
-    unpacker.unpack(&chunk, data).map_err(corrupt)?;
-    Ok(chunk)
-}
-
-/// The header of a message record's body.
-pub(crate) fn message_header(body: &[u8]) -> Result<records::MessageHeader, String> {
-    let short = || format!("message record of {} bytes", body.len());
-    let (channel, rest) = body.split_first_chunk().ok_or_else(short)?;
-    let (sequence, rest) = rest.split_first_chunk().ok_or_else(short)?;
-    let (log_time, rest) = rest.split_first_chunk().ok_or_else(short)?;
-    let (publish_time, _) = rest.split_first_chunk().ok_or_else(short)?;
-    Ok(records::MessageHeader {
-        channel_id: u16::from_le_bytes(*channel),
-        sequence: u32::from_le_bytes(*sequence),
-        log_time: u64::from_le_bytes(*log_time),
-        publish_time: u64::from_le_bytes(*publish_time),
-    })
+) -> Result<ChunkHeader> {
+    let corrupt = |reason: String| source.corrupt(offset, reason);
+    match record::parse(op::CHUNK, body).map_err(corrupt)? {
+        Record::Chunk { header, data: packed } => {
+            unpacker.unpack(source, offset, &header, &packed, data)?;
+            Ok(header)
+        }
+        other => Err(corrupt(misplaced(op::CHUNK, &other))),
+    }
 }

@@ -1,9 +1,11 @@
-//! One MCAP file: records, chunks, writing with an index, and finding the index again.
+//! One file of a bag: its records, its index, its chunks, and writing it. Records are the `mcap` crate's.
 
 pub(crate) mod chunk;
 pub(crate) mod index;
 pub(crate) mod record;
-pub(crate) mod records;
-pub(crate) mod scan;
+pub(crate) mod source;
+pub(crate) mod sqlite;
+mod summary;
 pub(crate) mod unpack;
+pub(crate) mod walk;
 pub(crate) mod writer;

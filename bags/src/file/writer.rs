@@ -2,12 +2,19 @@
 
 use std::{collections::BTreeMap, fs::File, io, os::unix::fs::FileExt};
 
+use mcap::{
+    MAGIC,
+    records::{
+        AttachmentIndex, Channel, ChunkHeader, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex,
+        SchemaHeader, Statistics, SummaryOffset, op,
+    },
+};
+
 use super::{
     chunk::{Chunk, Compressor},
     record,
-    records::{self, MAGIC, op},
 };
-use crate::topic::Topic;
+use crate::{reader::Attachment, topic::Topic};
 
 /// Where a file's bytes go: positional writes, and cutting off what does not fit.
 pub(crate) trait Disk: Send {
@@ -44,7 +51,7 @@ pub(crate) struct FileSummary {
 
 /// A chunk on disk, with what must be known to close the file before it.
 struct Written {
-    index: records::ChunkIndex,
+    index: ChunkIndex,
     counts: Vec<(u16, u64)>,
     crc_before: crc32fast::Hasher,
 }
@@ -60,13 +67,14 @@ pub(crate) struct FileWriter {
     definitions: Vec<u8>,
     schemas: u16,
     channels: u32,
-    metadata: Vec<records::MetadataIndex>,
+    metadata: Vec<MetadataIndex>,
+    attachments: Vec<AttachmentIndex>,
     chunks: Vec<Written>,
 }
 
 impl FileWriter {
     /// Starts a file with its header.
-    pub(crate) fn create(disk: Box<dyn Disk>) -> io::Result<Self> {
+    pub(crate) fn create(disk: Box<dyn Disk>, profile: &str) -> io::Result<Self> {
         let mut file = Self {
             disk,
             len: 0,
@@ -76,14 +84,12 @@ impl FileWriter {
             schemas: 0,
             channels: 0,
             metadata: Vec::new(),
+            attachments: Vec::new(),
             chunks: Vec::new(),
         };
-        let header = records::Header {
-            profile: "ros2".to_owned(),
-            library: concat!("swath-bags ", env!("CARGO_PKG_VERSION")).to_owned(),
-        };
+        let library = concat!("swath-bags ", env!("CARGO_PKG_VERSION")).to_owned();
         file.scratch.extend_from_slice(MAGIC);
-        record::put_body(&mut file.scratch, &header);
+        record::put(&mut file.scratch, op::HEADER, &Header { profile: profile.to_owned(), library });
         file.append_scratch()?;
         Ok(file)
     }
@@ -103,27 +109,23 @@ impl FileWriter {
     /// They stand outside chunks, so that a damaged chunk does not take them along.
     pub(crate) fn add_topic(&mut self, topic: &Topic, ids: TopicIds) -> io::Result<()> {
         self.scratch.clear();
-        if ids.new_schema {
-            let schema = records::Schema {
-                id: ids.schema,
-                name: topic.type_name.clone(),
-                encoding: topic.schema_encoding.clone(),
-                data: topic.schema.clone().into_bytes(),
-            };
-            record::put_body(&mut self.scratch, &schema);
+        if let (true, Some(definition)) = (ids.new_schema, &topic.definition) {
+            let encoding = definition.encoding.clone();
+            let header = SchemaHeader { id: ids.schema, name: topic.type_name.clone(), encoding };
+            record::put_with(&mut self.scratch, op::SCHEMA, |out| {
+                record::put_fields(out, &header);
+                out.extend_from_slice(&(definition.data.len() as u32).to_le_bytes());
+                out.extend_from_slice(&definition.data);
+            });
         }
-        let metadata = BTreeMap::from([
-            ("offered_qos_profiles".to_owned(), topic.qos_yaml.clone()),
-            ("topic_type_hash".to_owned(), topic.type_hash.clone()),
-        ]);
-        let channel = records::Channel {
+        let channel = Channel {
             id: ids.channel,
             schema_id: ids.schema,
             topic: topic.name.clone(),
             message_encoding: topic.message_encoding.clone(),
-            metadata,
+            metadata: topic.metadata.clone(),
         };
-        record::put_body(&mut self.scratch, &channel);
+        record::put(&mut self.scratch, op::CHANNEL, &channel);
         self.append_scratch()?;
         self.definitions.extend_from_slice(&self.scratch);
         self.schemas += u16::from(ids.new_schema);
@@ -132,13 +134,35 @@ impl FileWriter {
     }
 
     /// Writes a metadata record.
-    pub(crate) fn add_metadata(&mut self, metadata: &records::Metadata) -> io::Result<()> {
+    pub(crate) fn add_metadata(&mut self, metadata: &Metadata) -> io::Result<()> {
         let offset = self.len;
         self.scratch.clear();
-        record::put_body(&mut self.scratch, metadata);
+        record::put(&mut self.scratch, op::METADATA, metadata);
         self.append_scratch()?;
         let length = self.len - offset;
-        self.metadata.push(records::MetadataIndex { offset, length, name: metadata.name.clone() });
+        self.metadata.push(MetadataIndex { offset, length, name: metadata.name.clone() });
+        Ok(())
+    }
+
+    /// Copies an attachment's record, byte for byte, a piece at a time.
+    pub(crate) fn add_attachment(&mut self, attachment: &Attachment) -> io::Result<()> {
+        let (offset, crc) = (self.len, self.crc.clone());
+        let place = attachment.place;
+        let copied = attachment.source.for_each_piece(place.offset, place.end(), |piece| {
+            self.scratch.clear();
+            self.scratch.extend_from_slice(piece);
+            self.append_scratch()
+        });
+        if let Err(error) = copied {
+            (self.len, self.crc) = (offset, crc);
+            // The first error tells more than a failed clean-up would.
+            let _ = self.disk.truncate(offset);
+            return Err(error);
+        }
+        let Attachment { log_time, create_time, bytes, name, media_type, .. } = attachment.clone();
+        let length = self.len - offset;
+        let index = AttachmentIndex { offset, length, log_time, create_time, data_size: bytes, name, media_type };
+        self.attachments.push(index);
         Ok(())
     }
 
@@ -148,19 +172,22 @@ impl FileWriter {
         let packed = compressor.compress(&chunk.data)?;
         let out = &mut self.scratch;
         out.clear();
-        let stored = records::Chunk {
+        let compressed_size = packed.len() as u64;
+        let header = ChunkHeader {
             message_start_time: chunk.start,
             message_end_time: chunk.end,
             uncompressed_size: chunk.data.len() as u64,
             uncompressed_crc: crc32fast::hash(&chunk.data),
-            compression: compression.into(),
-            records: packed,
+            compression: compression.to_owned(),
+            compressed_size,
         };
-        record::put(out, op::CHUNK, |out| stored.put(out));
+        record::put_with(out, op::CHUNK, |out| {
+            record::put_fields(out, &header);
+            out.extend_from_slice(packed);
+        });
         let chunk_length = out.len() as u64;
-        let compressed_size = packed.len() as u64;
         let message_index_offsets = put_message_indexes(out, chunk, self.len);
-        let index = records::ChunkIndex {
+        let index = ChunkIndex {
             message_start_time: chunk.start,
             message_end_time: chunk.end,
             chunk_start_offset: self.len,
@@ -190,6 +217,7 @@ impl FileWriter {
         self.len = offset;
         self.crc = last.crc_before.clone();
         self.metadata.retain(|m| m.offset < offset);
+        self.attachments.retain(|a| a.offset < offset);
         self.chunks.pop();
         Ok(Some(messages))
     }
@@ -199,13 +227,13 @@ impl FileWriter {
         let summary = self.summary();
         self.scratch.clear();
         let data_section_crc = self.crc.clone().finalize();
-        record::put_body(&mut self.scratch, &records::DataEnd { data_section_crc });
+        record::put(&mut self.scratch, op::DATA_END, &DataEnd { data_section_crc });
         let data_end_len = self.scratch.len();
         let groups = self.put_summary(&summary);
         let summary_start = self.len + data_end_len as u64;
         let summary_offset_start = self.len + self.scratch.len() as u64;
         for group in groups {
-            record::put_body(&mut self.scratch, &group);
+            record::put(&mut self.scratch, op::SUMMARY_OFFSET, &group);
         }
         self.put_footer(data_end_len, summary_start, summary_offset_start);
         self.append_scratch()?;
@@ -224,7 +252,7 @@ impl FileWriter {
     }
 
     /// Appends the summary section to the scratch buffer; returns where its groups lie.
-    fn put_summary(&mut self, summary: &FileSummary) -> Vec<records::SummaryOffset> {
+    fn put_summary(&mut self, summary: &FileSummary) -> Vec<SummaryOffset> {
         let statistics = self.statistics(summary);
         let out = &mut self.scratch;
         let mut groups = Vec::new();
@@ -232,7 +260,7 @@ impl FileWriter {
             if to > from {
                 let group_start = self.len + from as u64;
                 let group_length = (to - from) as u64;
-                groups.push(records::SummaryOffset { group_opcode, group_start, group_length });
+                groups.push(SummaryOffset { group_opcode, group_start, group_length });
             }
         };
         // Readers look for schemas and channels as two groups, as summary offsets name them.
@@ -247,27 +275,26 @@ impl FileWriter {
             group(opcode, from, out.len());
         }
         let from = out.len();
-        record::put_body(out, &statistics);
+        record::put(out, op::STATISTICS, &statistics);
         group(op::STATISTICS, from, out.len());
         let from = out.len();
-        for chunk in &self.chunks {
-            record::put_body(out, &chunk.index);
-        }
+        self.chunks.iter().for_each(|chunk| record::put(out, op::CHUNK_INDEX, &chunk.index));
         group(op::CHUNK_INDEX, from, out.len());
         let from = out.len();
-        for metadata in &self.metadata {
-            record::put_body(out, metadata);
-        }
+        self.attachments.iter().for_each(|index| record::put(out, op::ATTACHMENT_INDEX, index));
+        group(op::ATTACHMENT_INDEX, from, out.len());
+        let from = out.len();
+        self.metadata.iter().for_each(|index| record::put(out, op::METADATA_INDEX, index));
         group(op::METADATA_INDEX, from, out.len());
         groups
     }
 
-    fn statistics(&self, summary: &FileSummary) -> records::Statistics {
-        records::Statistics {
+    fn statistics(&self, summary: &FileSummary) -> Statistics {
+        Statistics {
             message_count: summary.messages,
             schema_count: self.schemas,
             channel_count: self.channels,
-            attachment_count: 0,
+            attachment_count: self.attachments.len() as u32,
             metadata_count: self.metadata.len() as u32,
             chunk_count: self.chunks.len() as u32,
             message_start_time: summary.start,
@@ -279,8 +306,7 @@ impl FileWriter {
     /// Appends footer and end magic; the CRC covers all from the summary's start to itself.
     fn put_footer(&mut self, data_end_len: usize, summary_start: u64, summary_offset_start: u64) {
         let out = &mut self.scratch;
-        let footer = records::Footer { summary_start, summary_offset_start, summary_crc: 0 };
-        record::put_body(out, &footer);
+        record::put(out, op::FOOTER, &Footer { summary_start, summary_offset_start, summary_crc: 0 });
         let crc_at = out.len() - 4;
         let crc = crc32fast::hash(&out[data_end_len..crc_at]);
         out[crc_at..].copy_from_slice(&crc.to_le_bytes());
@@ -305,7 +331,7 @@ impl FileWriter {
 pub(crate) struct TopicIds {
     /// Channel id, from 0.
     pub channel: u16,
-    /// Schema id, from 1.
+    /// Schema id, from 1; 0 for none.
     pub schema: u16,
     /// Whether this topic is the first with that schema.
     pub new_schema: bool,
@@ -317,7 +343,7 @@ fn put_message_indexes(out: &mut Vec<u8>, chunk: &Chunk, base: u64) -> BTreeMap<
     for (channel, entries) in chunk.index.iter().enumerate().filter(|(_, e)| !e.is_empty()) {
         let channel = channel as u16;
         offsets.insert(channel, base + out.len() as u64);
-        record::put(out, op::MESSAGE_INDEX, |out| {
+        record::put_with(out, op::MESSAGE_INDEX, |out| {
             out.extend_from_slice(&channel.to_le_bytes());
             out.extend_from_slice(&((entries.len() * 16) as u32).to_le_bytes());
             for (time, offset) in entries {

@@ -5,10 +5,12 @@ use std::{
     io::{self, Write},
 };
 
+use super::note;
 use crate::{
     error::{BagError, Result, chain},
     reader::{Bag, BagTopic, Filter},
     schema::{Schema, to_json},
+    topic::Topic,
 };
 
 /// Writes one JSON object a message: topic, type, time [s], `log_time_ns`, sequence, message.
@@ -17,15 +19,27 @@ use crate::{
 /// `message`. Returns the number of messages written.
 ///
 /// # Errors
-/// [`BagError::Io`] when `out` refuses, [`BagError::Corrupt`] when a chunk is damaged.
-pub fn cat(bag: &Bag, filter: &Filter, limit: Option<u64>, out: &mut dyn Write) -> Result<u64> {
+/// [`BagError::Io`] when `out` refuses; damage is passed over and added to `faults`.
+pub fn cat(
+    bag: &Bag,
+    filter: &Filter,
+    limit: Option<u64>,
+    out: &mut dyn Write,
+    faults: &mut Vec<String>,
+) -> Result<u64> {
     let mut schemas: BTreeMap<usize, Result<Schema, String>> = BTreeMap::new();
     let mut messages = bag.messages(filter)?;
     let mut line = Vec::new();
     let mut written = 0;
-    while limit.is_none_or(|limit| written < limit)
-        && let Some(message) = messages.next()?
-    {
+    while limit.is_none_or(|limit| written < limit) {
+        let message = match messages.next() {
+            Ok(Some(message)) => message,
+            Ok(None) => break,
+            Err(error) => {
+                note(faults, &error);
+                continue;
+            }
+        };
         let topic = &bag.topics()[message.topic];
         let schema = schemas.entry(message.topic).or_insert_with(|| schema_of(topic));
         line.clear();
@@ -47,10 +61,14 @@ pub fn cat(bag: &Bag, filter: &Filter, limit: Option<u64>, out: &mut dyn Write) 
 
 /// The parsed schema of a topic, or why there is none.
 fn schema_of(topic: &BagTopic) -> Result<Schema, String> {
-    if topic.topic.schema_encoding != "ros2msg" {
-        return Err(format!("no schema known for {}", topic.topic.type_name));
+    let Topic { type_name, message_encoding, .. } = &topic.topic;
+    if message_encoding != "cdr" {
+        return Err(format!("message encoding {message_encoding:?} is not cdr"));
     }
-    topic.parse_schema().map_err(|e| chain(&e))
+    match topic.topic.schema_encoding() {
+        "" => Err(format!("no schema known for {type_name}")),
+        _ => topic.parse_schema().map_err(|e| chain(&e)),
+    }
 }
 
 fn put_message(schema: Result<&Schema, &String>, data: &[u8], line: &mut Vec<u8>) {

@@ -3,7 +3,6 @@
 use super::validate::{Report, SHOWN, TopicReport};
 use crate::{
     error::chain,
-    qos,
     reader::{BagTopic, Message},
     schema::{Schema, Visitor, decode},
     topic::is_type_name,
@@ -34,23 +33,28 @@ impl TopicCheck {
         if !is_type_name(&topic.topic.type_name) {
             fault(format!("type {:?} is not of the form pkg/msg/Type", topic.topic.type_name));
         }
-        check_metadata(topic, &mut fault);
-        let schema = match (topic.topic.schema_encoding.as_str(), topic.parse_schema()) {
-            ("ros2msg", Ok(schema)) => Some(schema),
-            ("ros2msg", Err(error)) => {
+        check_hash(topic, &mut fault);
+        if let Some(Err(error)) = topic.topic.offered_qos() {
+            fault(chain(&error));
+        }
+        let schema = match (topic.topic.schema_encoding(), topic.parse_schema()) {
+            (_, Ok(schema)) => Some(schema),
+            ("ros2msg" | "ros2idl", Err(error)) => {
                 fault(chain(&error));
                 None
             }
-            ("", _) => {
-                let text = format!("{name}: no schema known for {}", topic.topic.type_name);
-                report.warnings.push(text);
+            ("" | "unknown", _) => {
+                report.warnings.push(format!("{name}: no schema known for {}", topic.topic.type_name));
                 None
             }
             (other, _) => {
-                fault(format!("schema encoding {other:?} is not \"ros2msg\""));
+                fault(format!("schema encoding {other:?} is neither \"ros2msg\" nor \"ros2idl\""));
                 None
             }
         };
+        if topic.topic.offered_qos().is_none() {
+            report.warnings.push(format!("{name}: the channel has no offered_qos_profiles"));
+        }
         let report = TopicReport { topic: name.clone(), ..TopicReport::default() };
         Self { name, schema, report, last_time: None, sequences: None, bad_cdr: 0 }
     }
@@ -120,23 +124,18 @@ impl TopicCheck {
     }
 }
 
-fn check_metadata(topic: &BagTopic, fault: &mut impl FnMut(String)) {
-    match topic.metadata.get("offered_qos_profiles").map(|yaml| qos::from_yaml(yaml)) {
-        None => fault("the channel has no offered_qos_profiles".to_owned()),
-        Some(Err(error)) => fault(chain(&error)),
-        Some(Ok(_)) => {}
-    }
-    let Some(hash) = topic.metadata.get("topic_type_hash") else {
-        fault("the channel has no topic_type_hash".to_owned());
+/// Checks the type's hash; an empty one, or none, is one that was not known.
+fn check_hash(topic: &BagTopic, fault: &mut impl FnMut(String)) {
+    let hash = topic.topic.type_hash();
+    if hash.is_empty() {
         return;
-    };
+    }
     let digits = hash.strip_prefix("RIHS01_");
-    let formed = digits.is_some_and(|d| d.len() == 64 && d.bytes().all(|b| b.is_ascii_hexdigit()));
-    if !hash.is_empty() && !formed {
+    if !digits.is_some_and(|d| d.len() == 64 && d.bytes().all(|b| b.is_ascii_hexdigit())) {
         fault(format!("topic_type_hash {hash:?} is no RIHS01 hash"));
     }
     let known = swath_msgs::Interface::find(&topic.topic.type_name);
-    if let Some(known) = known.filter(|k| k.schema == topic.topic.schema && k.type_hash != hash) {
+    if let Some(known) = known.filter(|k| k.schema.as_bytes() == topic.topic.schema() && k.type_hash != hash) {
         fault(format!("topic_type_hash {hash:?} is not the type's, {}", known.type_hash));
     }
 }

@@ -1,19 +1,22 @@
 //! Saves what is whole in damaged or unclosed bags.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-use super::copy::copy_metadata;
+use mcap::records::{Metadata, op};
+
+use super::{copy::copy_metadata, note, validate::check_attachment};
 use crate::{
-    error::{Result, chain},
+    error::{BagError, Result},
     file::{
-        index::{FileIndex, message_header, unpack},
-        record::{MESSAGE_HEADER_LEN, Records},
-        records::{Schema, op},
-        scan::{Place, Places, Source},
-        unpack::Unpacker,
+        index::{FileIndex, Storage, unpack},
+        record::{self, Records},
+        source::{ReadOptions, Source},
+        sqlite::is_sqlite,
+        unpack::{Unpacker, ZSTD_MAGIC},
+        walk::{Place, Walk},
     },
-    metadata::BagInformation,
-    reader::{Message, channel_topic, mcap_files},
+    reader::{Attachment, Listing, Message, distinct},
+    topic::Topic,
     writer::{BagOptions, BagSummary, BagWriter, TopicId},
 };
 
@@ -26,121 +29,194 @@ pub struct Recovery {
     pub faults: Vec<String>,
 }
 
-/// Copies every message that is whole into a new bag.
+/// Copies every message that is whole into a new bag, with schemas, metadata records and attachments.
 ///
-/// A damaged chunk is left out; the walk through a file ends where no record can be found.
+/// A damaged chunk is left out. Where no record can be found, the walk goes on at the next chunk that the file's index
+/// knows, if it has one.
 ///
 /// # Errors
-/// [`crate::BagError::NotABag`] when there is no MCAP file, and whatever writing reports.
-pub fn recover(from: &Path, to: &Path, mut options: BagOptions) -> Result<Recovery> {
-    let files = mcap_files(from)?;
+/// [`BagError::NotABag`] when there is no file, and whatever writing reports.
+pub fn recover(from: &Path, to: &Path, mut options: BagOptions, read: ReadOptions) -> Result<Recovery> {
+    let listing = Listing::of(from)?;
     // A bag that was not closed has none, or one that is out of date: only its free text counts.
-    if let Ok(Some(information)) = BagInformation::read(from) {
-        options.custom_data.extend(information.custom_data.unwrap_or_default());
+    let information = listing.information.unwrap_or_default();
+    options.custom_data.extend(information.custom_data.unwrap_or_default());
+    let mut faults = listing.faults;
+    let mut files = Vec::new();
+    for path in listing.files.iter().chain(&listing.unlisted) {
+        match open(path, read, &mut faults) {
+            Ok(index) => files.push(index),
+            Err(error) => note(&mut faults, &error),
+        }
+    }
+    if let Some(first) = files.first() {
+        options.profile.clone_from(&first.profile);
     }
     let writer = BagWriter::create(to, options)?;
-    let mut faults = Vec::new();
-    for file in &files {
-        if let Err(error) = salvage(file, &writer, &mut faults) {
-            faults.push(chain(&error));
-        }
+    let mut metadata = Vec::new();
+    for index in files {
+        let mut file = Salvage::new(index, &writer);
+        file.save(&mut faults);
+        metadata.push(file.index.metadata);
         if writer.has_stopped() {
             break;
         }
     }
+    copy_metadata(&distinct(metadata.iter().map(|file: &Vec<Metadata>| &file[..])), &writer);
     Ok(Recovery { summary: writer.close()?, faults })
 }
 
-/// Copies the whole messages of one file.
-fn salvage(path: &Path, writer: &BagWriter, faults: &mut Vec<String>) -> Result<()> {
-    let index = FileIndex::start(Source::open(path)?)?;
-    let source = std::sync::Arc::clone(&index.source);
-    let mut file = Salvage { index, topics: BTreeMap::new(), writer };
-    let mut unpacker = Unpacker::default();
-    let (mut body, mut data) = (Vec::new(), Vec::new());
-    for place in Places::new(&source) {
-        let place = match place {
-            Ok(place) => place,
-            Err(error) => {
-                faults.push(chain(&error));
-                break;
-            }
-        };
-        if matches!(place.opcode, op::DATA_END | op::FOOTER) {
-            break;
-        }
-        let saved = place.read_body(&source, &mut body).and_then(|()| match place.opcode {
-            op::CHUNK => {
-                unpack(&source, place, &body, &mut unpacker, &mut data)?;
-                file.save_chunk(place, &data)
-            }
-            op::MESSAGE => file.save_message(place, &body),
-            op::METADATA | op::SCHEMA | op::CHANNEL => file.index.add(place, &body),
-            _ => Ok(()),
-        });
-        if let Err(error) = saved {
-            faults.push(chain(&error));
-        }
-        if writer.has_stopped() {
-            break;
-        }
+/// A file's header, or all of a SQLite file's index.
+fn open(path: &Path, options: ReadOptions, faults: &mut Vec<String>) -> Result<FileIndex> {
+    match is_sqlite(path)? {
+        true => FileIndex::open_sqlite(path, options),
+        false => FileIndex::start(&Arc::new(Source::open(path, options, Some(faults))?)),
     }
-    let metadata = file.index.metadata.into_iter().map(|m| (m.name, m.metadata));
-    let metadata: Vec<_> = metadata.collect();
-    copy_metadata(&metadata, writer);
-    Ok(())
 }
 
+/// A file of which the whole messages are copied.
 struct Salvage<'a> {
     index: FileIndex,
     topics: BTreeMap<u16, TopicId>,
     writer: &'a BagWriter,
+    unpacker: Unpacker,
+    /// A message that was compressed by itself.
+    plain: Vec<u8>,
 }
 
-impl Salvage<'_> {
+impl<'a> Salvage<'a> {
+    fn new(index: FileIndex, writer: &'a BagWriter) -> Self {
+        Self { index, topics: BTreeMap::new(), writer, unpacker: Unpacker::default(), plain: Vec::new() }
+    }
+
+    fn save(&mut self, faults: &mut Vec<String>) {
+        match self.index.storage.clone() {
+            Storage::Mcap(source) => self.save_mcap(&source, faults),
+            Storage::Sqlite(_) => self.save_rows(faults),
+        }
+        // Topics without messages are topics too.
+        for id in self.index.channels.keys().copied().collect::<Vec<_>>() {
+            if let Err(error) = self.topic(0, id) {
+                note(faults, &error);
+            }
+        }
+    }
+
+    fn save_rows(&mut self, faults: &mut Vec<String>) {
+        let (mut packed, mut data) = (Vec::new(), Vec::new());
+        for chunk in std::mem::take(&mut self.index.chunks) {
+            let place = Place { offset: chunk.offset, opcode: op::CHUNK, body_len: 0 };
+            let loaded = self.index.load(&chunk, &mut self.unpacker, &mut packed, &mut data);
+            if let Err(error) = loaded.and_then(|()| self.save_chunk(place, &data)) {
+                note(faults, &error);
+            }
+        }
+    }
+
+    fn save_mcap(&mut self, source: &Arc<Source>, faults: &mut Vec<String>) {
+        let chunks = self.index.read_repeated(source);
+        let (mut body, mut data) = (Vec::new(), Vec::new());
+        let mut walk = Walk::whole(source);
+        while let Some(place) = walk.next() {
+            let place = match place {
+                Ok(place) if matches!(place.opcode, op::DATA_END | op::FOOTER) => break,
+                Ok(place) => place,
+                Err(error) => {
+                    note(faults, &error);
+                    let Some(next) = chunks.iter().find(|offset| **offset > walk.offset()) else { break };
+                    walk = Walk::between(source, *next, source.len);
+                    continue;
+                }
+            };
+            if let Err(error) = self.save_record(source, &walk, place, &mut body, &mut data) {
+                note(faults, &error);
+            }
+            if self.writer.has_stopped() {
+                break;
+            }
+        }
+    }
+
+    fn save_record(
+        &mut self,
+        source: &Arc<Source>,
+        walk: &Walk<'_>,
+        place: Place,
+        body: &mut Vec<u8>,
+        data: &mut Vec<u8>,
+    ) -> Result<()> {
+        match place.opcode {
+            op::ATTACHMENT => return self.save_attachment(source, place),
+            op::CHUNK | op::MESSAGE | op::METADATA | op::SCHEMA | op::CHANNEL => walk.read_body(place, body)?,
+            _ => return Ok(()),
+        }
+        match place.opcode {
+            op::CHUNK => {
+                unpack(source, place.offset, body, &mut self.unpacker, data)?;
+                self.save_chunk(place, data)
+            }
+            op::MESSAGE => self.save_message(place, body),
+            _ => self.index.add(source, place, body),
+        }
+    }
+
+    fn save_attachment(&mut self, source: &Arc<Source>, place: Place) -> Result<()> {
+        self.index.add_attachment(source, place)?;
+        let Some(found) = self.index.attachments.last() else { return Ok(()) };
+        check_attachment(source, found)?;
+        self.writer.add_attachment(&Attachment::of(source, found));
+        Ok(())
+    }
+
     /// Saves a chunk's messages, all or none: a chunk that unpacks badly is not to be trusted.
     fn save_chunk(&mut self, place: Place, data: &[u8]) -> Result<()> {
         let records: Vec<_> = Records::new(data)
             .collect::<Result<_, _>>()
-            .map_err(|(at, reason)| self.fault(place, format!("chunk, byte {at}: {reason}")))?;
+            .map_err(|(at, reason)| self.fault(place.offset, format!("chunk, byte {at}: {reason}")))?;
         for (_, opcode, body) in records {
-            match opcode {
-                op::MESSAGE => self.save_message(place, body)?,
-                _ => self.index.add(Place { opcode, ..place }, body)?,
+            match (opcode, self.index.storage.clone()) {
+                (op::MESSAGE, _) => self.save_message(place, body)?,
+                (_, Storage::Mcap(source)) => self.index.add(&source, Place { opcode, ..place }, body)?,
+                _ => {}
             }
         }
         Ok(())
     }
 
     fn save_message(&mut self, place: Place, body: &[u8]) -> Result<()> {
-        let header = message_header(body).map_err(|reason| self.fault(place, reason))?;
-        let topic = match self.topics.get(&header.channel_id) {
-            Some(topic) => *topic,
-            None => self.add_topic(place, header.channel_id)?,
-        };
+        let (header, mut data) = record::message(body).map_err(|reason| self.fault(place.offset, reason))?;
+        let topic = self.topic(place.offset, header.channel_id)?;
+        let is_cdr = self.index.channels.get(&header.channel_id).is_some_and(|c| c.message_encoding == "cdr");
+        if is_cdr && data.starts_with(&ZSTD_MAGIC) {
+            self.unpacker.unpack_message(&self.index.storage, place.offset, data, &mut self.plain)?;
+            data = &self.plain;
+        }
         let message = Message {
             topic: 0,
             sequence: header.sequence,
             log_time: header.log_time,
             publish_time: header.publish_time,
-            data: &body[MESSAGE_HEADER_LEN..],
+            data,
         };
         // A writer that has stopped tells why when it is closed.
         let _ = self.writer.copy(topic, &message);
         Ok(())
     }
 
-    fn add_topic(&mut self, place: Place, id: u16) -> Result<TopicId> {
-        let unknown = || self.fault(place, format!("message of unknown channel {id}"));
+    /// The new bag's topic for a channel.
+    fn topic(&mut self, offset: u64, id: u16) -> Result<TopicId> {
+        if let Some(topic) = self.topics.get(&id) {
+            return Ok(*topic);
+        }
+        let unknown = || self.fault(offset, format!("message of unknown channel {id}"));
         let channel = self.index.channels.get(&id).ok_or_else(unknown)?;
-        let none = Schema::default();
-        let schema = self.index.schemas.get(&channel.schema_id).unwrap_or(&none);
-        let topic = self.writer.add_topic(&channel_topic(channel, schema).topic)?;
+        let schema = self.index.schemas.get(&channel.schema_id);
+        let topic = self.writer.add_topic(&Topic::of_channel(channel, schema))?;
         self.topics.insert(id, topic);
         Ok(topic)
     }
 
-    fn fault(&self, place: Place, reason: String) -> crate::BagError {
-        self.index.source.corrupt(place.offset, reason)
+    fn fault(&self, offset: u64, reason: String) -> BagError {
+        self.index.storage.corrupt(offset, reason)
     }
 }

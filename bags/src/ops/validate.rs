@@ -1,22 +1,33 @@
 //! Checks that a bag is what it should be, down to every message.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use serde::Serialize;
 
+use mcap::{
+    MAGIC,
+    records::{Record, op},
+};
+
+use super::note;
 use crate::{
     error::{BagError, Result, chain},
     file::{
-        records::{Body, DataEnd, MAGIC, op},
-        scan::{Places, Source},
+        index::{AttachmentRef, FileIndex, Storage},
+        record::{self, misplaced},
+        source::{ReadOptions, Source},
+        walk::Walk,
     },
     metadata::{BagInformation, FILE_NAME},
     ops::checks::TopicCheck,
-    reader::{Bag, Filter},
+    reader::{Bag, Filter, metadata_path},
 };
 
 /// Faults of one kind that are written out before the rest is only counted.
 pub(super) const SHOWN: u64 = 5;
+
+/// The version of `metadata.yaml` from which on it has types' hashes.
+const HASH_SINCE: u32 = 7;
 
 /// What validation found.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -51,19 +62,30 @@ pub struct TopicReport {
 ///
 /// # Errors
 /// [`BagError`] only when the path cannot be read at all; damage is a fault of the report.
-pub fn validate(path: &Path, max_gap_ns: Option<u64>) -> Result<Report> {
-    let mut report = Report::default();
-    let bag = match Bag::open(path) {
+pub fn validate(path: &Path, max_gap_ns: Option<u64>, options: ReadOptions) -> Result<Report> {
+    let bag = match Bag::open_all(&[path.to_owned()], options) {
         Ok(bag) => bag,
-        Err(error @ (BagError::Corrupt { .. } | BagError::NotABag { .. })) => {
-            report.faults.push(chain(&error));
-            return Ok(report);
-        }
-        Err(error) => return Err(error),
+        Err(BagError::Io { action, path, source }) => return Err(BagError::Io { action, path, source }),
+        Err(error) => return Ok(Report { faults: vec![chain(&error)], ..Report::default() }),
     };
-    check_files(&bag, &mut report);
+    let mut report = validate_open(&bag, max_gap_ns)?;
+    if path.is_dir() {
+        check_yaml(&bag, &mut report);
+    }
+    Ok(report)
+}
+
+/// Checks an open bag as [`validate`] does, its `metadata.yaml` excepted.
+///
+/// # Errors
+/// None that the bag's bytes cause.
+pub fn validate_open(bag: &Bag, max_gap_ns: Option<u64>) -> Result<Report> {
+    let mut report = Report { faults: bag.faults().to_vec(), ..Report::default() };
+    for file in bag.indexes() {
+        check_file(file, &mut report);
+    }
     let mut checks: Vec<TopicCheck> = bag.topics().iter().map(|topic| TopicCheck::new(topic, &mut report)).collect();
-    check_messages(&bag, &mut checks, &mut report)?;
+    check_messages(bag, &mut checks, &mut report)?;
     for (check, topic) in checks.into_iter().zip(bag.topics()) {
         report.topics.push(check.finish(topic, max_gap_ns, &mut report.faults, &mut report.warnings));
     }
@@ -71,47 +93,70 @@ pub fn validate(path: &Path, max_gap_ns: Option<u64>) -> Result<Report> {
     if lost > 0 {
         report.warnings.push(format!("the recording lost {lost} messages"));
     }
-    if path.is_dir() {
-        check_yaml(&bag, &mut report);
-    }
     Ok(report)
 }
 
-fn check_files(bag: &Bag, report: &mut Report) {
-    for file in bag.files() {
-        let path = file.path.display();
-        if file.profile != "ros2" {
-            report.faults.push(format!("{path}: profile {:?} is not \"ros2\"", file.profile));
-        }
-        if let Err(error) = check_data_section(&file.path) {
+fn check_file(file: &FileIndex, report: &mut Report) {
+    let Storage::Mcap(source) = &file.storage else { return };
+    if file.profile != "ros2" {
+        let path = source.path.display();
+        report.faults.push(format!("{path}: profile {:?} is not \"ros2\"", file.profile));
+    }
+    if let Err(error) = check_data_section(source) {
+        report.faults.push(chain(&error));
+    }
+    for attachment in &file.attachments {
+        if let Err(error) = check_attachment(source, attachment) {
             report.faults.push(chain(&error));
         }
     }
 }
 
 /// Walks all records and compares the data section's checksum, where the file has one.
-fn check_data_section(path: &Path) -> Result<()> {
-    let source = Source::open(path)?;
+fn check_data_section(source: &Source) -> Result<()> {
     let mut crc = crc32fast::Hasher::new();
     crc.update(MAGIC);
     let mut bytes = Vec::new();
-    for place in Places::new(&source) {
-        let place = place?;
+    let mut walk = Walk::whole(source);
+    while let Some(place) = walk.next().transpose()? {
         if place.opcode != op::DATA_END {
-            source.update_crc(place.offset, place.end(), &mut crc)?;
+            source.for_each_piece(place.offset, place.end(), |piece| {
+                crc.update(piece);
+                Ok::<_, BagError>(())
+            })?;
             continue;
         }
-        place.read_body(&source, &mut bytes)?;
-        let end = DataEnd::parse(&bytes).map_err(|reason| source.corrupt(place.offset, reason))?;
-        let saved = end.data_section_crc;
+        walk.read_body(place, &mut bytes)?;
+        let corrupt = |reason| source.corrupt(place.offset, reason);
+        let saved = match record::parse(op::DATA_END, &bytes).map_err(corrupt)? {
+            Record::DataEnd(end) => end.data_section_crc,
+            other => return Err(corrupt(misplaced(op::DATA_END, &other))),
+        };
         let found = crc.finalize();
         if saved != 0 && saved != found {
-            let reason = format!("data section checksum is {found:08x}, not {saved:08x}");
-            return Err(source.corrupt(place.offset, reason));
+            return Err(corrupt(format!("data section checksum is {found:08x}, not {saved:08x}")));
         }
         return Ok(());
     }
     Err(source.corrupt(source.len, "no data end record"))
+}
+
+/// Compares an attachment's checksum, where it has one.
+pub(super) fn check_attachment(source: &Source, attachment: &AttachmentRef) -> Result<()> {
+    let mut crc = crc32fast::Hasher::new();
+    let end = attachment.data_end;
+    source.for_each_piece(attachment.place.body(), end, |piece| {
+        crc.update(piece);
+        Ok::<_, BagError>(())
+    })?;
+    let mut saved = [0; 4];
+    source.read_at(end, &mut saved)?;
+    let (saved, found) = (u32::from_le_bytes(saved), crc.finalize());
+    if saved != 0 && saved != found {
+        let reason = format!("attachment checksum is {found:08x}, not {saved:08x}");
+        return Err(source.corrupt(attachment.place.offset, reason));
+    }
+    Ok(())
 }
 
 /// Decodes every message; goes on behind a damaged chunk.
@@ -124,7 +169,7 @@ fn check_messages(bag: &Bag, checks: &mut [TopicCheck], report: &mut Report) -> 
                 checks[message.topic].message(&message, &mut report.faults);
             }
             Ok(None) => return Ok(()),
-            Err(error) => report.faults.push(chain(&error)),
+            Err(error) => note(&mut report.faults, &error),
         }
     }
 }
@@ -134,43 +179,61 @@ fn check_yaml(bag: &Bag, report: &mut Report) {
     let information = match BagInformation::read(bag.path()) {
         Ok(Some(information)) => information,
         Ok(None) => {
-            report.faults.push(format!("{} is missing", bag.path().join(FILE_NAME).display()));
+            report.faults.push(format!("{} is missing", metadata_path(bag.path()).display()));
             return;
         }
-        Err(error) => {
-            report.faults.push(chain(&error));
-            return;
-        }
+        // The bag has told it.
+        Err(_) => return,
     };
     let mut differs = |what: &str, yaml: String, files: String| {
         if yaml != files {
             report.faults.push(format!("{FILE_NAME}: {what} is {yaml}, the files say {files}"));
         }
     };
-    let (start, end) = bag.time_range().unwrap_or((0, 0));
-    let yaml_start = information.starting_time.nanoseconds_since_epoch;
-    differs("storage identifier", information.storage_identifier.clone(), "mcap".to_owned());
+    let files = bag.files();
+    let storage = files.first().map_or("mcap", |file| file.storage);
+    differs("storage identifier", information.storage_identifier.clone(), storage.to_owned());
     differs("message count", information.message_count.to_string(), bag.message_count().to_string());
-    differs("starting time", yaml_start.to_string(), start.to_string());
-    differs("duration", information.duration.nanoseconds.to_string(), end.saturating_sub(start).to_string());
-    let mut yaml: Vec<String> = information.relative_file_paths.clone();
+    // Without messages there is no start that could be wrong.
+    if let Some((start, end)) = bag.time_range() {
+        differs("starting time", information.starting_time.nanoseconds_since_epoch.to_string(), start.to_string());
+        differs("duration", information.duration.nanoseconds.to_string(), (end - start).to_string());
+    }
+    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let mut yaml: Vec<String> = information.relative_file_paths.iter().filter_map(|f| name(Path::new(f))).collect();
     yaml.sort();
-    let names = bag.files().into_iter().filter_map(|f| f.path.file_name().map(|n| n.to_owned()));
-    let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> = files.iter().filter_map(|f| name(&f.path)).collect();
     names.sort();
     differs("list of files", yaml.join(", "), names.join(", "));
-    let mut yaml: Vec<String> = information
-        .topics_with_message_count
-        .iter()
-        .map(|t| {
-            let topic = &t.topic_metadata;
-            format!("{} {} {} {}", topic.name, topic.type_name, t.message_count, topic.type_description_hash)
-        })
-        .collect();
-    yaml.sort();
-    let describe =
-        |t: &crate::BagTopic| format!("{} {} {} {}", t.topic.name, t.topic.type_name, t.messages, t.topic.type_hash);
-    let mut topics: Vec<String> = bag.topics().iter().map(describe).collect();
-    topics.sort();
+    let (yaml, topics) = (listed_topics(&information), found_topics(bag, information.version));
     differs("list of topics", yaml.join(", "), topics.join(", "));
+}
+
+/// Name, type, count and hash of the topics in `metadata.yaml`.
+fn listed_topics(information: &BagInformation) -> Vec<String> {
+    let topics = information.topics_with_message_count.iter().map(|t| {
+        let topic = &t.topic_metadata;
+        described(&topic.name, &topic.type_name, t.message_count, &topic.type_description_hash)
+    });
+    let mut topics: Vec<String> = topics.collect();
+    topics.sort();
+    topics
+}
+
+/// The same of the topics in the files, as a version of `metadata.yaml` tells it.
+fn found_topics(bag: &Bag, version: u32) -> Vec<String> {
+    let mut topics: BTreeMap<(&str, &str), (u64, &str)> = BTreeMap::new();
+    for topic in bag.topics() {
+        let hash = if version >= HASH_SINCE { topic.topic.type_hash() } else { "" };
+        let (count, _) = topics.entry((&topic.topic.name, &topic.topic.type_name)).or_insert((0, hash));
+        *count += topic.messages;
+    }
+    let mut topics: Vec<String> =
+        topics.into_iter().map(|((name, kind), (count, hash))| described(name, kind, count, hash)).collect();
+    topics.sort();
+    topics
+}
+
+fn described(name: &str, kind: &str, count: u64, hash: &str) -> String {
+    format!("{name} {kind} {count} {hash}")
 }

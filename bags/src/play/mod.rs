@@ -22,6 +22,7 @@ use self::{
 };
 use crate::{
     error::{BagError, Result, chain},
+    file::source::ReadOptions,
     qos::{Durability, QosOverride, QosProfile},
     reader::{Bag, BagTopic, Filter, TopicPattern},
     ros_qos::to_ros,
@@ -46,6 +47,8 @@ const FAREWELL: Duration = Duration::from_millis(500);
 pub struct PlayOptions {
     /// Bags, which are played as one.
     pub bags: Vec<PathBuf>,
+    /// How their files are read.
+    pub read: ReadOptions,
     /// Which topics.
     pub topics: TopicPattern,
     /// Log time over wall time; 0 is as fast as it goes.
@@ -109,7 +112,7 @@ impl Player {
     /// # Errors
     /// Whatever keeps a bag from being read or a publisher from being made.
     pub fn run(self, shutdown: &Shutdown, ready: impl FnOnce(usize)) -> Result<PlaySummary> {
-        let bag = Bag::open_all(&self.options.bags)?;
+        let bag = Bag::open_all(&self.options.bags, self.options.read)?;
         let (from, filter) = self.span(&bag)?;
         let publishers = self.publishers(&bag)?;
         let count = publishers.iter().flatten().count();

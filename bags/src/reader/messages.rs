@@ -2,14 +2,15 @@
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
+use mcap::records::op;
+
 use super::{Bag, Filter};
 use crate::{
     error::Result,
     file::{
-        index::{ChunkRef, load, message_header},
-        record::{MESSAGE_HEADER_LEN, Records},
-        records::op,
-        unpack::Unpacker,
+        index::{ChunkRef, FileIndex},
+        record::{self, PREFIX_LEN, Records},
+        unpack::{Unpacker, ZSTD_MAGIC},
     },
 };
 
@@ -28,7 +29,7 @@ pub struct Message<'a> {
     pub log_time: u64,
     /// Time of sending [ns].
     pub publish_time: u64,
-    /// CDR with its encapsulation header.
+    /// The message; CDR with its encapsulation header. One that was compressed by itself is unpacked.
     pub data: &'a [u8],
 }
 
@@ -59,7 +60,10 @@ struct Open {
 #[derive(Debug, Clone, Copy)]
 struct Place {
     file: usize,
-    chunk: ChunkRef,
+    /// Index into the file's chunks.
+    chunk: usize,
+    /// Earliest log time [ns].
+    start: u64,
     /// Its number in order of recording, which decides between messages of one time.
     rank: usize,
 }
@@ -86,22 +90,29 @@ pub struct Messages<'a> {
     memory: usize,
     unpacker: Unpacker,
     packed: Vec<u8>,
+    /// A message that was compressed by itself.
+    plain: Vec<u8>,
 }
 
 impl<'a> Messages<'a> {
     pub(super) fn new(bag: &'a Bag, filter: &Filter) -> Result<Self> {
+        let selected = filter.selected(&bag.topics)?;
         let mut chunks = Vec::new();
         for (number, file) in bag.files.iter().enumerate() {
-            let wanted = |c: &&ChunkRef| c.end >= filter.from && c.start <= filter.until;
-            let place = |chunk: &ChunkRef| Place { file: number, chunk: *chunk, rank: 0 };
-            chunks.extend(file.chunks.iter().filter(wanted).map(place));
+            let wanted = |chunk: &ChunkRef| {
+                let in_time = chunk.end >= filter.from && chunk.start <= filter.until;
+                let is_selected = |id: &u16| bag.channels[number].get(id).is_none_or(|topic| selected[*topic]);
+                in_time && chunk.channels.as_ref().is_none_or(|channels| channels.iter().any(is_selected))
+            };
+            let wanted = file.chunks.iter().enumerate().filter(|(_, chunk)| wanted(chunk));
+            chunks.extend(wanted.map(|(chunk, at)| Place { file: number, chunk, start: at.start, rank: 0 }));
         }
-        chunks.sort_by_key(|place: &Place| (place.file, place.chunk.offset));
+        chunks.sort_by_key(|place: &Place| (place.file, bag.files[place.file].chunks[place.chunk].offset));
         chunks.iter_mut().enumerate().for_each(|(rank, place)| place.rank = rank);
-        chunks.sort_by_key(|place| (place.chunk.start, place.rank));
+        chunks.sort_by_key(|place| (place.start, place.rank));
         Ok(Self {
             bag,
-            selected: filter.selected(&bag.topics)?,
+            selected,
             from: filter.from,
             until: filter.until,
             chunks,
@@ -113,6 +124,7 @@ impl<'a> Messages<'a> {
             memory: MEMORY_BYTES,
             unpacker: Unpacker::default(),
             packed: Vec::new(),
+            plain: Vec::new(),
         })
     }
 
@@ -149,25 +161,35 @@ impl<'a> Messages<'a> {
         self.message(slot, entry).map(Some)
     }
 
-    fn message(&self, slot: usize, entry: Entry) -> Result<Message<'_>> {
-        let open = &self.open[slot];
-        let Place { file, chunk, .. } = self.chunks[open.chunk];
-        let body = &open.data[entry.body as usize..][..entry.len as usize];
-        let header =
-            message_header(body).map_err(|reason| self.bag.files[file].source.corrupt(chunk.offset, reason))?;
+    fn message(&mut self, slot: usize, entry: Entry) -> Result<Message<'_>> {
+        let (file, chunk) = self.chunk(self.open[slot].chunk);
+        let body = &self.open[slot].data[entry.body as usize..][..entry.len as usize];
+        let (header, mut data) = record::message(body).map_err(|reason| file.storage.corrupt(chunk.offset, reason))?;
+        let topic = entry.topic as usize;
+        if data.starts_with(&ZSTD_MAGIC) && self.bag.topics[topic].topic.message_encoding == "cdr" {
+            self.unpacker.unpack_message(&file.storage, chunk.offset, data, &mut self.plain)?;
+            data = &self.plain;
+        }
         Ok(Message {
-            topic: entry.topic as usize,
+            topic,
             sequence: header.sequence,
             log_time: header.log_time,
             publish_time: header.publish_time,
-            data: &body[MESSAGE_HEADER_LEN..],
+            data,
         })
+    }
+
+    /// A chunk by its number in `chunks`, and its file.
+    fn chunk(&self, number: usize) -> (&'a FileIndex, &'a ChunkRef) {
+        let Place { file, chunk, .. } = self.chunks[number];
+        let file = &self.bag.files[file];
+        (file, &file.chunks[chunk])
     }
 
     /// Opens every chunk that may hold the next message.
     fn open_due_chunks(&mut self) -> Result<()> {
-        while let Some(Place { chunk, rank, .. }) = self.chunks.get(self.upcoming).copied() {
-            if self.heap.peek().is_some_and(|Reverse((time, ..))| *time < chunk.start) {
+        while let Some(Place { start, rank, .. }) = self.chunks.get(self.upcoming).copied() {
+            if self.heap.peek().is_some_and(|Reverse((time, ..))| *time < start) {
                 break;
             }
             let chunk = self.upcoming;
@@ -209,19 +231,19 @@ impl<'a> Messages<'a> {
 
     /// Reads a slot's chunk and sorts its messages.
     fn fill(&mut self, slot: usize) -> Result<()> {
-        let Open { chunk, entries, data, .. } = &mut self.open[slot];
-        let Place { file, chunk, .. } = self.chunks[*chunk];
-        let source = &self.bag.files[file].source;
+        let (file, chunk) = self.chunk(self.open[slot].chunk);
+        let channels = &self.bag.channels[self.chunks[self.open[slot].chunk].file];
+        let Open { entries, data, .. } = &mut self.open[slot];
         entries.clear();
-        load(source, &chunk, &mut self.unpacker, &mut self.packed, data)?;
-        let channels = &self.bag.channels[file];
-        let in_chunk = |at: usize, reason: String| source.corrupt(chunk.offset, format!("chunk, byte {at}: {reason}"));
+        file.load(chunk, &mut self.unpacker, &mut self.packed, data)?;
+        let in_chunk =
+            |at: usize, reason: String| file.storage.corrupt(chunk.offset, format!("chunk, byte {at}: {reason}"));
         for item in Records::new(data) {
             let (at, opcode, body) = item.map_err(|(at, reason)| in_chunk(at, reason))?;
             if opcode != op::MESSAGE {
                 continue;
             }
-            let header = message_header(body).map_err(|reason| in_chunk(at, reason))?;
+            let (header, _) = record::message(body).map_err(|reason| in_chunk(at, reason))?;
             let topic = *channels
                 .get(&header.channel_id)
                 .ok_or_else(|| in_chunk(at, format!("message of unknown channel {}", header.channel_id)))?;
@@ -229,7 +251,7 @@ impl<'a> Messages<'a> {
             if in_time && self.selected[topic] {
                 entries.push(Entry {
                     log_time: header.log_time,
-                    body: (at + crate::file::record::PREFIX_LEN) as u32,
+                    body: (at + PREFIX_LEN) as u32,
                     len: body.len() as u32,
                     topic: topic as u32,
                 });

@@ -1,36 +1,42 @@
 //! Reads bags: what is in them, and their messages in order of time.
 
+mod files;
 mod messages;
 mod select;
 
 use std::{
-    collections::BTreeMap,
-    fs,
+    collections::{BTreeMap, HashMap},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
+pub(crate) use files::{Listing, metadata_path};
+use mcap::records::Metadata;
 pub use messages::{Message, Messages};
 pub use select::{Filter, TopicPattern};
 
 use crate::{
-    error::{BagError, Result},
+    error::{BagError, Result, chain},
     file::{
-        index::FileIndex,
-        records::{Channel, Schema},
+        index::{AttachmentRef, FileIndex, Storage},
+        source::{ReadOptions, Source},
+        sqlite::is_sqlite,
+        walk::Place,
     },
-    metadata::{self, BagInformation},
-    qos, schema,
-    topic::Topic,
+    metadata::BagInformation,
+    schema,
+    topic::{Topic, TopicKey},
     writer::{Losses, RECORDING},
 };
+
+/// The metadata record in which rosbag2 repeats a file's information.
+const ROSBAG2: &str = "rosbag2";
 
 /// A topic of an open bag.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BagTopic {
-    /// Name, type, schema, QoS; the QoS is empty when its YAML is at fault.
+    /// Name, type, schema, QoS.
     pub topic: Topic,
-    /// The channel's metadata as stored.
-    pub metadata: BTreeMap<String, String>,
     /// Messages in all files.
     pub messages: u64,
 }
@@ -39,9 +45,9 @@ impl BagTopic {
     /// Parses the topic's schema.
     ///
     /// # Errors
-    /// [`BagError::Schema`] when it is malformed.
+    /// [`BagError::Schema`] when it is malformed, or of an encoding that is not known.
     pub fn parse_schema(&self) -> Result<schema::Schema> {
-        schema::Schema::parse(&self.topic.type_name, &self.topic.schema)
+        schema::Schema::of(&self.topic)
     }
 }
 
@@ -50,8 +56,10 @@ impl BagTopic {
 pub struct BagFile {
     /// Where it is.
     pub path: PathBuf,
-    /// Its size [bytes].
+    /// Its size, unpacked if it is compressed as a whole [bytes].
     pub bytes: u64,
+    /// `mcap` or `sqlite3`.
+    pub storage: &'static str,
     /// MCAP profile, `ros2` in ROS 2 bags.
     pub profile: String,
     /// The program that wrote it.
@@ -66,7 +74,38 @@ pub struct BagFile {
     pub compressions: BTreeMap<String, u64>,
 }
 
-/// A bag open for reading: a directory with MCAP files, or a single MCAP file.
+/// A file that was put into a bag beside the messages.
+#[derive(Debug, Clone)]
+pub struct Attachment {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Time of recording [ns].
+    pub log_time: u64,
+    /// Time of its making [ns]; 0 when not known.
+    pub create_time: u64,
+    /// Length of its data [bytes].
+    pub bytes: u64,
+    pub(crate) source: Arc<Source>,
+    pub(crate) place: Place,
+}
+
+impl Attachment {
+    pub(crate) fn of(source: &Arc<Source>, found: &AttachmentRef) -> Self {
+        Self {
+            name: found.header.name.clone(),
+            media_type: found.header.media_type.clone(),
+            log_time: found.header.log_time,
+            create_time: found.header.create_time,
+            bytes: found.data_len,
+            source: Arc::clone(source),
+            place: found.place,
+        }
+    }
+}
+
+/// A bag open for reading: a directory with MCAP or SQLite files, or a single file.
 #[derive(Debug)]
 pub struct Bag {
     path: PathBuf,
@@ -75,82 +114,117 @@ pub struct Bag {
     /// By file, by channel id: index into `topics`.
     channels: Vec<BTreeMap<u16, usize>>,
     information: Option<BagInformation>,
+    faults: Vec<String>,
 }
 
 impl Bag {
     /// Opens a bag and reads its index, not its messages.
     ///
     /// # Errors
-    /// [`BagError::NotABag`] when there is no MCAP file, [`BagError::Corrupt`] when one is damaged
-    /// or was not closed.
+    /// As [`open_all`](Self::open_all).
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_all(&[path.to_owned()])
+        Self::open_all(&[path.to_owned()], ReadOptions::default())
     }
 
-    /// Opens several bags as one.
+    /// Opens several bags as one. Files that cannot be read are left out and told by [`faults`](Self::faults), as long
+    /// as one can.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
-    pub fn open_all(paths: &[PathBuf]) -> Result<Self> {
+    /// [`BagError::NotABag`] when there is no file, [`BagError::Corrupt`] when all are damaged or were not closed.
+    pub fn open_all(paths: &[PathBuf], options: ReadOptions) -> Result<Self> {
+        let mut bag = Self::empty(paths.first().cloned().unwrap_or_default());
         let mut files = Vec::new();
+        let mut first_error = None;
         for path in paths {
-            for file in mcap_files(path)? {
-                files.push(FileIndex::open(&file)?);
+            let listing = Listing::of(path)?;
+            check_compression(path, listing.information.as_ref())?;
+            bag.faults.extend(listing.faults);
+            let unlisted = listing.unlisted.iter().map(|f| format!("{} is not in the bag's list", f.display()));
+            bag.faults.extend(unlisted);
+            for file in &listing.files {
+                match open_file(file, options) {
+                    Ok(index) => files.push(index),
+                    Err(error) => {
+                        bag.faults.push(format!("not read: {}", chain(&error)));
+                        first_error.get_or_insert(error);
+                    }
+                }
+            }
+            if let [_] = paths {
+                bag.information = listing.information;
             }
         }
-        files.sort_by_key(|file| (start_of(file), file.source.path.clone()));
-        let information = match paths {
-            // Only the files count; validation tells what is wrong with `metadata.yaml`.
-            [path] if path.is_dir() => BagInformation::read(path).ok().flatten(),
-            _ => None,
-        };
-        let mut bag = Self {
-            path: paths.first().cloned().unwrap_or_default(),
-            files: Vec::new(),
-            topics: Vec::new(),
-            channels: Vec::new(),
-            information,
-        };
-        for file in files {
-            bag.add_file(file)?;
+        if let (true, Some(error)) = (files.is_empty(), first_error) {
+            return Err(error);
         }
-        bag.sort_topics();
+        bag.take_files(files)?;
         Ok(bag)
     }
 
-    fn add_file(&mut self, file: FileIndex) -> Result<()> {
-        let mut by_channel = BTreeMap::new();
-        let none = Schema::default();
-        for (id, channel) in &file.channels {
-            let schema = match channel.schema_id {
-                0 => &none,
-                schema => file.schemas.get(&schema).ok_or_else(|| {
-                    let reason = format!("channel {} refers to no schema {schema}", channel.topic);
-                    file.source.corrupt(file.source.len, reason)
-                })?,
+    /// Opens an MCAP file whose bytes are in memory.
+    ///
+    /// # Errors
+    /// [`BagError::Corrupt`] when it is damaged or has no end.
+    pub fn from_bytes(bytes: impl Into<Arc<[u8]>>, options: ReadOptions) -> Result<Self> {
+        let mut bag = Self::empty("memory".into());
+        let index = FileIndex::open(Source::in_memory(&bag.path, bytes.into(), options))?;
+        bag.take_files(vec![index])?;
+        Ok(bag)
+    }
+
+    fn empty(path: PathBuf) -> Self {
+        let (files, topics, channels) = (Vec::new(), Vec::new(), Vec::new());
+        Self { path, files, topics, channels, information: None, faults: Vec::new() }
+    }
+
+    /// Puts files in order of time, and their topics together.
+    fn take_files(&mut self, mut files: Vec<FileIndex>) -> Result<()> {
+        files.sort_by_key(|file| (start_of(file).is_none(), start_of(file)));
+        let mut known = HashMap::new();
+        let mut first_error = None;
+        for file in files {
+            if let Err(error) = self.add_file(file, &mut known) {
+                self.faults.push(format!("not read: {}", chain(&error)));
+                first_error.get_or_insert(error);
+            }
+        }
+        if let (true, Some(error)) = (self.files.is_empty(), first_error) {
+            return Err(error);
+        }
+        self.sort_topics();
+        if self.information.is_none()
+            && let [file] = &self.files[..]
+        {
+            self.information = embedded_information(&file.metadata);
+        }
+        Ok(())
+    }
+
+    fn add_file(&mut self, file: FileIndex, known: &mut HashMap<TopicKey, usize>) -> Result<()> {
+        let topics = file.channels.iter().map(|(id, channel)| {
+            let missing = || {
+                let reason = format!("channel {} refers to no schema {}", channel.topic, channel.schema_id);
+                file.storage.corrupt(file.storage.len(), reason)
             };
-            let topic = channel_topic(channel, schema);
-            let index = self.topic_index(topic);
+            let schema = match channel.schema_id {
+                0 => None,
+                schema => Some(file.schemas.get(&schema).ok_or_else(missing)?),
+            };
+            Ok((*id, Topic::of_channel(channel, schema)))
+        });
+        let mut by_channel = BTreeMap::new();
+        for (id, topic) in topics.collect::<Result<Vec<_>>>()? {
+            let index = *known.entry(topic.key()).or_insert_with(|| {
+                self.topics.push(BagTopic { topic, messages: 0 });
+                self.topics.len() - 1
+            });
             let messages = &mut self.topics[index].messages;
-            *messages = messages.saturating_add(file.counts.get(id).copied().unwrap_or(0));
-            by_channel.insert(*id, index);
+            *messages = messages.saturating_add(file.counts.get(&id).copied().unwrap_or(0));
+            by_channel.insert(id, index);
         }
         self.channels.push(by_channel);
         self.files.push(file);
         Ok(())
-    }
-
-    /// The place of a topic, which is added when it is new.
-    fn topic_index(&mut self, topic: BagTopic) -> usize {
-        let same = |known: &BagTopic| {
-            known.topic.name == topic.topic.name
-                && known.topic.type_name == topic.topic.type_name
-                && known.topic.schema == topic.topic.schema
-        };
-        self.topics.iter().position(same).unwrap_or_else(|| {
-            self.topics.push(topic);
-            self.topics.len() - 1
-        })
     }
 
     /// Puts topics in order of name, so that nothing depends on the order of recording.
@@ -172,7 +246,14 @@ impl Bag {
         &self.path
     }
 
+    /// What of the bag could not be read: files that are missing or damaged, information that makes no sense.
+    pub fn faults(&self) -> &[String] {
+        &self.faults
+    }
+
     /// Topics in order of name; messages refer to them by index.
+    ///
+    /// A name stands more than once where its type, schema or metadata differ.
     pub fn topics(&self) -> &[BagTopic] {
         &self.topics
     }
@@ -180,8 +261,12 @@ impl Bag {
     /// Files in order of time.
     pub fn files(&self) -> Vec<BagFile> {
         let describe = |file: &FileIndex| BagFile {
-            path: file.source.path.clone(),
-            bytes: file.source.len,
+            path: file.storage.path().to_owned(),
+            bytes: file.storage.len(),
+            storage: match &file.storage {
+                Storage::Mcap(_) => "mcap",
+                Storage::Sqlite(_) => "sqlite3",
+            },
             profile: file.profile.clone(),
             library: file.library.clone(),
             messages: file.messages(),
@@ -190,6 +275,11 @@ impl Bag {
             compressions: file.compressions.clone(),
         };
         self.files.iter().map(describe).collect()
+    }
+
+    /// The files' indexes.
+    pub(crate) fn indexes(&self) -> &[FileIndex] {
+        &self.files
     }
 
     /// Messages in all files.
@@ -203,22 +293,32 @@ impl Bag {
         Some((chunks().map(|c| c.start).min()?, chunks().map(|c| c.end).max()?))
     }
 
-    /// Metadata records of all files in order, each content once.
+    /// The profile that all files have which have one; empty when they differ.
+    pub fn profile(&self) -> &str {
+        let mut profiles = self.files.iter().map(|file| file.profile.as_str()).filter(|profile| !profile.is_empty());
+        let first = profiles.next().unwrap_or_default();
+        if profiles.all(|profile| profile == first) { first } else { "" }
+    }
+
+    /// Metadata records of all files in order; what every file of a bag repeats counts once.
     pub fn metadata(&self) -> Vec<(String, BTreeMap<String, String>)> {
-        let mut records = Vec::new();
-        for metadata in self.files.iter().flat_map(|f| &f.metadata) {
-            let record = (metadata.name.clone(), metadata.metadata.clone());
-            if !records.contains(&record) {
-                records.push(record);
-            }
-        }
-        records
+        distinct(self.files.iter().map(|file| &file.metadata[..]))
     }
 
     /// The first metadata record of a name.
     pub fn metadata_named(&self, name: &str) -> Option<&BTreeMap<String, String>> {
         let mut all = self.files.iter().flat_map(|f| &f.metadata);
         all.find(|m| m.name == name).map(|m| &m.metadata)
+    }
+
+    /// Attachments of all files.
+    pub fn attachments(&self) -> Vec<Attachment> {
+        let mut attachments = Vec::new();
+        for file in &self.files {
+            let Storage::Mcap(source) = &file.storage else { continue };
+            attachments.extend(file.attachments.iter().map(|attachment| Attachment::of(source, attachment)));
+        }
+        attachments
     }
 
     /// Messages that were to be in the bag and are not, as its recording told.
@@ -232,7 +332,7 @@ impl Bag {
         losses
     }
 
-    /// `metadata.yaml`, where there is one.
+    /// `metadata.yaml`, or what a single file of rosbag2 says in its place.
     pub fn information(&self) -> Option<&BagInformation> {
         self.information.as_ref()
     }
@@ -246,53 +346,48 @@ impl Bag {
     }
 }
 
-/// A channel and its schema as a topic, without messages yet.
-pub(crate) fn channel_topic(channel: &Channel, schema: &Schema) -> BagTopic {
-    let qos = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
-    BagTopic {
-        topic: Topic {
-            name: channel.topic.clone(),
-            type_name: schema.name.clone(),
-            schema: String::from_utf8_lossy(&schema.data).into_owned(),
-            type_hash: channel.metadata.get("topic_type_hash").cloned().unwrap_or_default(),
-            schema_encoding: schema.encoding.clone(),
-            message_encoding: channel.message_encoding.clone(),
-            qos: qos::from_yaml(qos).unwrap_or_default(),
-            qos_yaml: qos.to_owned(),
-        },
-        metadata: channel.metadata.clone(),
-        messages: 0,
+/// The metadata records of several files, those that a later one repeats once.
+pub(crate) fn distinct<'a>(files: impl Iterator<Item = &'a [Metadata]>) -> Vec<(String, BTreeMap<String, String>)> {
+    let mut records: Vec<&Metadata> = Vec::new();
+    for file in files {
+        let mut told = vec![false; records.len()];
+        for metadata in file {
+            match (0..told.len()).find(|n| !told[*n] && records[*n] == metadata) {
+                Some(n) => told[n] = true,
+                None => records.push(metadata),
+            }
+        }
     }
+    records.into_iter().map(|metadata| (metadata.name.clone(), metadata.metadata.clone())).collect()
+}
+
+/// Opens one file of a bag, of whichever kind it is.
+fn open_file(path: &Path, options: ReadOptions) -> Result<FileIndex> {
+    match is_sqlite(path)? {
+        true => FileIndex::open_sqlite(path, options),
+        false => FileIndex::open(Source::open(path, options, None)?),
+    }
+}
+
+/// Refuses a bag whose messages or files are compressed in a way that is not known.
+fn check_compression(path: &Path, information: Option<&BagInformation>) -> Result<()> {
+    let Some(information) = information else { return Ok(()) };
+    let BagInformation { compression_mode: mode, compression_format: format, .. } = information;
+    let none = |text: &str| text.is_empty() || text.eq_ignore_ascii_case("none");
+    if none(mode) || none(format) || format.eq_ignore_ascii_case("zstd") {
+        return Ok(());
+    }
+    let reason = format!("it is compressed with {format:?} in mode {mode:?}, only zstd is known");
+    Err(BagError::NotABag { path: path.to_owned(), reason })
+}
+
+/// The information that rosbag2 puts into a file as it closes it.
+fn embedded_information(metadata: &[Metadata]) -> Option<BagInformation> {
+    let last = metadata.iter().rfind(|record| record.name == ROSBAG2)?;
+    BagInformation::parse_embedded(last.metadata.get("serialized_metadata")?)
 }
 
 /// Earliest log time of a file with messages.
 fn start_of(file: &FileIndex) -> Option<u64> {
     file.chunks.iter().map(|c| c.start).min()
-}
-
-/// The MCAP files that a path stands for, in order of name.
-///
-/// # Errors
-/// [`BagError::NotABag`] when there is none.
-pub(crate) fn mcap_files(path: &Path) -> Result<Vec<PathBuf>> {
-    let not_a_bag = |reason: &str| BagError::NotABag { path: path.to_owned(), reason: reason.to_owned() };
-    let kind = fs::metadata(path).map_err(BagError::io("open", path))?;
-    if kind.is_file() {
-        return Ok(vec![path.to_owned()]);
-    }
-    let entries = fs::read_dir(path).map_err(BagError::io("read", path))?;
-    let mut files = Vec::new();
-    for entry in entries {
-        let file = entry.map_err(BagError::io("read", path))?.path();
-        if file.extension().is_some_and(|e| e == "mcap") {
-            files.push(file);
-        }
-    }
-    if files.is_empty() {
-        let hint = path.join(metadata::FILE_NAME);
-        let storage = if hint.exists() { "its storage is not MCAP" } else { "it holds no .mcap file" };
-        return Err(not_a_bag(storage));
-    }
-    files.sort();
-    Ok(files)
 }

@@ -41,9 +41,9 @@ impl Source {
         subscription: RawSubscription,
         entry: Option<&'static graph::Entry>,
     ) -> Result<Self> {
-        let stamp = match topic.schema.is_empty() {
+        let stamp = match topic.schema().is_empty() {
             true => StampPlace::Nowhere,
-            false => StampPlace::of(&Schema::parse(&topic.type_name, &topic.schema)?),
+            false => StampPlace::of(&Schema::of(topic)?),
         };
         Ok(Self {
             name: topic.name.clone(),

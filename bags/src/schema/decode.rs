@@ -46,15 +46,19 @@ pub trait Visitor {
 /// [`BagError::Cdr`] when the bytes end early, a length, bound or text is impossible, or more
 /// than padding is left.
 pub fn decode(schema: &Schema, data: &[u8], visitor: &mut dyn Visitor) -> Result<()> {
-    let mut decoder = Decoder { schema, data, at: 0, little: true };
-    decoder.encapsulation()?;
-    decoder.structure(0, visitor)?;
-    let left = data.len() - decoder.at;
-    // Writers round payloads up to four bytes.
-    if left > 3 {
-        return Err(decoder.error(format!("{left} bytes are left behind the message")));
-    }
-    Ok(())
+    Decoder::new(schema, data, None).whole(visitor)
+}
+
+/// Where the numbers of a message are that have more than one byte: offset and size of each.
+///
+/// # Errors
+/// As [`decode`].
+pub(super) fn numbers(schema: &Schema, data: &[u8]) -> Result<Vec<(usize, usize)>> {
+    struct Nothing;
+    impl Visitor for Nothing {}
+    let mut places = Vec::new();
+    Decoder::new(schema, data, Some(&mut places)).whole(&mut Nothing)?;
+    Ok(places)
 }
 
 /// The encapsulation header, which alignment does not count.
@@ -65,9 +69,28 @@ struct Decoder<'a> {
     data: &'a [u8],
     at: usize,
     little: bool,
+    /// Greatest alignment: 8, and 4 in the second version of CDR.
+    alignment: usize,
+    /// Where the places of numbers are noted, if they are wanted.
+    places: Option<&'a mut Vec<(usize, usize)>>,
 }
 
 impl<'a> Decoder<'a> {
+    fn new(schema: &'a Schema, data: &'a [u8], places: Option<&'a mut Vec<(usize, usize)>>) -> Self {
+        Self { schema, data, at: 0, little: true, alignment: 8, places }
+    }
+
+    fn whole(mut self, visitor: &mut dyn Visitor) -> Result<()> {
+        self.encapsulation()?;
+        self.structure(0, visitor)?;
+        let left = self.data.len() - self.at;
+        // Writers round payloads up to four bytes.
+        if left > 3 {
+            return Err(self.error(format!("{left} bytes are left behind the message")));
+        }
+        Ok(())
+    }
+
     fn error(&self, reason: impl Into<String>) -> BagError {
         let type_name = self.schema.type_name.clone();
         BagError::Cdr { type_name, offset: self.at, reason: reason.into() }
@@ -78,6 +101,8 @@ impl<'a> Decoder<'a> {
         match header {
             [0, 0, ..] => self.little = false,
             [0, 1, ..] => self.little = true,
+            [0, 6, ..] => (self.little, self.alignment) = (false, 4),
+            [0, 7, ..] => (self.little, self.alignment) = (true, 4),
             [a, b, ..] => {
                 self.at = 0;
                 return Err(self.error(format!("encapsulation {a:#04x} {b:#04x} is not plain CDR")));
@@ -98,8 +123,11 @@ impl<'a> Decoder<'a> {
 
     fn take_array<const N: usize>(&mut self) -> Result<[u8; N]> {
         let position = self.at - HEADER;
-        let padding = position.next_multiple_of(N) - position;
+        let padding = position.next_multiple_of(N.min(self.alignment)) - position;
         self.take(padding)?;
+        if let Some(places) = self.places.as_mut().filter(|_| N > 1) {
+            places.push((self.at, N));
+        }
         let mut bytes = [0; N];
         bytes.copy_from_slice(self.take(N)?);
         if !self.little {
@@ -226,6 +254,14 @@ mod tests {
     fn check(schema: &str, data: &[u8]) -> Result<()> {
         let schema = Schema::parse("a/msg/B", schema)?;
         decode(&schema, data, &mut Nothing)
+    }
+
+    #[test]
+    fn the_second_version_of_cdr_aligns_to_four_bytes() {
+        let schema = "uint8 a\nuint64 b\n";
+        check(schema, &[0, 7, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+        check(schema, &[0, 6, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1]).unwrap();
+        assert!(check(schema, &[0, 1, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]).is_err());
     }
 
     #[test]

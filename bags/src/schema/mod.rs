@@ -3,11 +3,16 @@
 mod decode;
 mod json;
 mod parse;
+mod turn;
 
 pub use decode::{Scalar, Visitor, decode};
 pub use json::to_json;
+pub use turn::to_little_endian;
 
-use crate::error::Result;
+use crate::{
+    error::{BagError, Result},
+    topic::Topic,
+};
 
 /// A type that fits one CDR value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,10 +107,30 @@ pub struct Schema {
 }
 
 impl Schema {
-    /// Parses the text of a `ros2msg` schema.
+    /// The schema of a topic.
     ///
     /// # Errors
-    /// [`crate::BagError::Schema`] when the text is malformed, lacks a type or contains itself.
+    /// [`BagError::Schema`] as for [`parse`](Self::parse), and when the schema is no text or of an encoding that is not
+    /// known.
+    pub fn of(topic: &Topic) -> Result<Self> {
+        let refuse = |reason: String| BagError::Schema { type_name: topic.type_name.clone(), line: 1, reason };
+        match topic.schema_encoding() {
+            // Of a type whose parts it did not find, rosbag2 does not say what its text is.
+            "ros2msg" | "ros2idl" | "unknown" => {}
+            "" => return Err(refuse("no schema is known".to_owned())),
+            other => return Err(refuse(format!("schema encoding {other:?} is not read"))),
+        }
+        let text = std::str::from_utf8(topic.schema()).map_err(|_| refuse("the schema is no UTF-8 text".to_owned()))?;
+        if topic.schema_encoding() == "unknown" && text.trim().is_empty() {
+            return Err(refuse("no schema is known".to_owned()));
+        }
+        Self::parse(&topic.full_type_name(), text)
+    }
+
+    /// Parses the text of a `ros2msg` or `ros2idl` schema.
+    ///
+    /// # Errors
+    /// [`BagError::Schema`] when the text is malformed, lacks a type or contains itself.
     pub fn parse(type_name: &str, text: &str) -> Result<Self> {
         parse::parse(type_name, text)
     }

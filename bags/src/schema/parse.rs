@@ -1,6 +1,8 @@
-//! Parses `ros2msg` texts: a definition, then its dependencies behind lines of `=`.
+//! Resolves the types of a bag's schema text: each member's type by its place among the definitions.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
+
+use swath_msgs::definition::{self, Base, Named, Shape};
 
 use super::{Count, Element, Field, Primitive, Schema, Struct};
 use crate::error::{BagError, Result};
@@ -8,27 +10,14 @@ use crate::error::{BagError, Result};
 /// Deepest nesting of messages that is accepted.
 const MAX_DEPTH: usize = 64;
 
-/// A definition whose field types are still names.
-struct Raw<'a> {
-    name: String,
-    fields: Vec<RawField<'a>>,
-}
-
-struct RawField<'a> {
-    line: usize,
-    base: &'a str,
-    name: &'a str,
-    count: Count,
-}
-
 struct Parser<'a> {
     type_name: &'a str,
 }
 
 pub(super) fn parse(type_name: &str, text: &str) -> Result<Schema> {
     let parser = Parser { type_name };
-    let raw = parser.definitions(text)?;
-    let schema = parser.resolve(&raw)?;
+    let definitions = definition::definitions(type_name, text).map_err(|e| parser.error(e.line, e.reason))?;
+    let schema = parser.resolve(definitions)?;
     let mut known = vec![Depth::Unknown; schema.structs.len()];
     parser.depth(&schema, 0, 0, &mut known)?;
     Ok(schema)
@@ -39,109 +28,42 @@ impl Parser<'_> {
         BagError::Schema { type_name: self.type_name.to_owned(), line, reason: reason.into() }
     }
 
-    fn definitions<'t>(&self, text: &'t str) -> Result<Vec<Raw<'t>>> {
-        let mut all = vec![Raw { name: short_name(self.type_name), fields: Vec::new() }];
-        let mut awaiting_name = false;
-        for (number, line) in (1..).zip(text.lines()) {
-            let line = line.split('#').next().unwrap_or("").trim();
-            if is_separator(line) {
-                awaiting_name = true;
-            } else if awaiting_name && !line.is_empty() {
-                let Some(name) = line.strip_prefix("MSG:") else {
-                    return Err(self.error(number, "a line of = is not followed by MSG:"));
-                };
-                all.push(Raw { name: short_name(name.trim()), fields: Vec::new() });
-                awaiting_name = false;
-            } else if let Some(field) = self.field(number, line)?
-                && let Some(last) = all.last_mut()
-            {
-                last.fields.push(field);
-            }
-        }
-        Ok(all)
-    }
-
-    /// The field that a line defines; `None` for constants and empty lines.
-    fn field<'t>(&self, line: usize, text: &'t str) -> Result<Option<RawField<'t>>> {
-        let Some((kind, rest)) = text.split_once(char::is_whitespace) else {
-            return match text {
-                "" => Ok(None),
-                _ => Err(self.error(line, format!("{text:?} has no name"))),
-            };
+    fn resolve(&self, mut definitions: Vec<Named>) -> Result<Schema> {
+        let own = short_name(self.type_name);
+        let Some(place) = definitions.iter().position(|named| named.name == own) else {
+            return Err(self.error(1, format!("the text does not define {own}")));
         };
-        let rest = rest.trim_start();
-        let name_len = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_');
-        let (name, behind) = rest.split_at(name_len.unwrap_or(rest.len()));
-        if name.is_empty() {
-            return Err(self.error(line, format!("{rest:?} is no field name")));
-        }
-        if behind.trim_start().starts_with('=') {
-            return Ok(None);
-        }
-        if !behind.is_empty() && !behind.starts_with(char::is_whitespace) {
-            return Err(self.error(line, format!("{rest:?} is no field name")));
-        }
-        let (base, count) = self.split_array(line, kind)?;
-        Ok(Some(RawField { line, base, name, count }))
-    }
-
-    /// Splits `T[<=3]` into `T` and how many.
-    fn split_array<'t>(&self, line: usize, kind: &'t str) -> Result<(&'t str, Count)> {
-        let Some(open) = kind.find('[') else { return Ok((kind, Count::One)) };
-        let base = &kind[..open];
-        let inside = kind[open + 1..].strip_suffix(']');
-        let number = |digits: &str| digits.parse::<usize>().ok();
-        let count = match inside {
-            Some("") => Some(Count::Sequence(None)),
-            Some(text) => match text.strip_prefix("<=") {
-                Some(bound) => number(bound).map(|bound| Count::Sequence(Some(bound))),
-                // Without an empty array, every message takes at least one byte: decoding ends.
-                None => number(text).filter(|n| *n > 0).map(Count::Fixed),
-            },
-            None => None,
-        };
-        let count = count.ok_or_else(|| self.error(line, format!("{kind:?} is no array type")))?;
-        Ok((base, count))
-    }
-
-    fn resolve(&self, raw: &[Raw<'_>]) -> Result<Schema> {
-        let mut places = BTreeMap::new();
-        for (index, definition) in raw.iter().enumerate() {
-            places.entry(definition.name.as_str()).or_insert(index);
+        definitions[..=place].rotate_right(1);
+        let mut places = HashMap::new();
+        for (index, named) in definitions.iter().enumerate() {
+            places.entry(named.name.as_str()).or_insert(index);
         }
         let mut structs = Vec::new();
-        for definition in raw {
-            let package = definition.name.split('/').next().unwrap_or("");
-            let mut fields = Vec::new();
-            for field in &definition.fields {
-                let element = self.element(field, package, &places)?;
-                fields.push(Field { name: field.name.to_owned(), element, count: field.count });
-            }
-            structs.push(Struct { name: definition.name.clone(), fields });
+        for Named { name, definition } in &definitions {
+            let fields = definition.fields.iter().map(|field| {
+                let element = self.element(field, &places)?;
+                Ok(Field { name: field.name.clone(), element, count: count(field.shape) })
+            });
+            structs.push(Struct { name: name.clone(), fields: fields.collect::<Result<_>>()? });
         }
         Ok(Schema { type_name: self.type_name.to_owned(), structs })
     }
 
-    fn element(&self, field: &RawField<'_>, package: &str, places: &BTreeMap<&str, usize>) -> Result<Element> {
-        let (base, bound) = match field.base.split_once("<=") {
-            Some((base, bound)) => {
-                let bad = || self.error(field.line, format!("{bound:?} is no bound"));
-                (base, Some(bound.parse().map_err(|_| bad())?))
+    fn element(&self, field: &definition::Field, places: &HashMap<&str, usize>) -> Result<Element> {
+        let (package, name) = match &field.base {
+            Base::Primitive(kind) => {
+                let (primitive, bound) = primitive(*kind);
+                return Ok(Element::Primitive(primitive, bound));
             }
-            None => (field.base, None),
+            Base::Nested { package, name } => (package, name),
         };
-        if let Some(primitive) = primitive(base) {
-            return Ok(Element::Primitive(primitive, bound));
-        }
-        let name = match base.contains('/') {
-            true => short_name(base),
-            false if base == "Header" => "std_msgs/Header".to_owned(),
-            false => format!("{package}/{base}"),
-        };
-        let place = places.get(name.as_str());
+        let full = if package.is_empty() { name.clone() } else { format!("{package}/{name}") };
+        // ROS 1 writes a header without its package.
+        let header = || places.get("std_msgs/Header").filter(|_| name == "Header");
+        let place = places.get(full.as_str()).or_else(header);
         place
             .map(|index| Element::Struct(*index))
-            .ok_or_else(|| self.error(field.line, format!("type {name} is not defined in the schema")))
+            .ok_or_else(|| self.error(field.line, format!("type {full} is not defined in the schema")))
     }
 
     /// The depth of a definition; refuses types that contain themselves, and towers of types.
@@ -179,10 +101,6 @@ enum Depth {
     Known(usize),
 }
 
-fn is_separator(line: &str) -> bool {
-    line.len() >= 3 && line.bytes().all(|byte| byte == b'=')
-}
-
 /// `pkg/Type` of `pkg/msg/Type` and of `pkg/Type`.
 fn short_name(name: &str) -> String {
     match (name.split_once('/'), name.rsplit_once('/')) {
@@ -191,23 +109,33 @@ fn short_name(name: &str) -> String {
     }
 }
 
-fn primitive(name: &str) -> Option<Primitive> {
-    Some(match name {
-        "bool" => Primitive::Bool,
-        "int8" => Primitive::I8,
-        "uint8" | "byte" | "char" => Primitive::U8,
-        "int16" => Primitive::I16,
-        "uint16" => Primitive::U16,
-        "int32" => Primitive::I32,
-        "uint32" => Primitive::U32,
-        "int64" => Primitive::I64,
-        "uint64" => Primitive::U64,
-        "float32" => Primitive::F32,
-        "float64" => Primitive::F64,
-        "string" => Primitive::String,
-        "wstring" => Primitive::WString,
-        _ => return None,
-    })
+fn count(shape: Shape) -> Count {
+    match shape {
+        Shape::Scalar => Count::One,
+        Shape::Array(len) => Count::Fixed(len),
+        Shape::Bounded(bound) => Count::Sequence(Some(bound)),
+        Shape::Unbounded => Count::Sequence(None),
+    }
+}
+
+fn primitive(kind: definition::Primitive) -> (Primitive, Option<usize>) {
+    use definition::Primitive as Kind;
+    let primitive = match kind {
+        Kind::String { bound } => return (Primitive::String, bound),
+        Kind::WString { bound } => return (Primitive::WString, bound),
+        Kind::Bool => Primitive::Bool,
+        Kind::Int8 => Primitive::I8,
+        Kind::Uint8 | Kind::Byte | Kind::Char => Primitive::U8,
+        Kind::Int16 => Primitive::I16,
+        Kind::Uint16 => Primitive::U16,
+        Kind::Int32 => Primitive::I32,
+        Kind::Uint32 => Primitive::U32,
+        Kind::Int64 => Primitive::I64,
+        Kind::Uint64 => Primitive::U64,
+        Kind::Float32 => Primitive::F32,
+        Kind::Float64 => Primitive::F64,
+    };
+    (primitive, None)
 }
 
 #[cfg(test)]
@@ -264,6 +192,19 @@ int8 x 5
             let error = Schema::parse("a/msg/Outer", text).unwrap_err();
             assert!(matches!(error, BagError::Schema { line: l, .. } if l == line), "{error}");
         }
+    }
+
+    #[test]
+    fn service_events_and_idl_are_read() {
+        let schema = Schema::parse("a/srv/Add_Event", "int64 a\n---\nint64 sum\n").unwrap();
+        let names: Vec<_> = schema.structs[0].fields.iter().map(|f| f.name.as_str()).collect();
+        assert_eq!(names, ["info", "request", "response"]);
+        let rule = "=".repeat(80);
+        let idl = format!("{rule}\nIDL: a/msg/P\nmodule a {{ module msg {{ struct P {{ double x; }}; }}; }};\n");
+        let schema = Schema::parse("a/msg/P", &idl).unwrap();
+        assert_eq!(schema.structs[0].fields[0].element, Element::Primitive(Primitive::F64, None));
+        let error = Schema::parse("a/msg/Q", &idl).unwrap_err().to_string();
+        assert!(error.ends_with("the text does not define a/Q"), "{error}");
     }
 
     #[test]

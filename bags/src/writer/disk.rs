@@ -9,12 +9,13 @@ use std::{
     time::Duration,
 };
 
+use mcap::records::Metadata;
+
 use super::{BagOptions, BagSummary, Job, Losses, RECORDING, Shared, State};
 use crate::{
     error::{BagError, Result},
     file::{
         chunk::{Chunk, Compressor},
-        records::Metadata,
         writer::{Disk, FileSummary, FileWriter, TopicIds},
     },
     metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata},
@@ -60,7 +61,8 @@ impl Storage {
     pub(super) fn create(dir: &Path, compressor: Compressor, options: BagOptions, open: OpenDisk) -> Result<Self> {
         let name = dir.file_name().map_or("bag".into(), |n| n.to_string_lossy().into_owned());
         let path = dir.join(format!("{name}_0.mcap"));
-        let file = open(&path).and_then(FileWriter::create).map_err(BagError::io("create", &path))?;
+        let create = |disk| FileWriter::create(disk, &options.profile);
+        let file = open(&path).and_then(create).map_err(BagError::io("create", &path))?;
         Ok(Self {
             dir: dir.to_owned(),
             name,
@@ -102,6 +104,7 @@ impl Storage {
                 self.metadata.push(record.clone());
                 self.file.add_metadata(&record)
             }
+            Job::Attachment(attachment) => self.file.add_attachment(&attachment),
             Job::Split => {
                 self.split = self.file.messages() > 0;
                 Ok(())
@@ -131,7 +134,8 @@ impl Storage {
         self.finish_file()?;
         self.write_yaml()?;
         let path = self.dir.join(self.file_name());
-        let opened = (self.open)(&path).and_then(FileWriter::create).and_then(|mut file| {
+        let opened = (self.open)(&path).and_then(|disk| {
+            let mut file = FileWriter::create(disk, &self.options.profile)?;
             self.topics.iter().try_for_each(|(topic, ids)| file.add_topic(topic, *ids))?;
             self.metadata.iter().try_for_each(|record| file.add_metadata(record))?;
             Ok(file)
@@ -227,7 +231,7 @@ impl Storage {
         };
         for (topic, ids) in &self.topics {
             let count = |f: &Finished| f.summary.counts.get(&ids.channel).copied().unwrap_or(0);
-            summary.counts.insert(topic.name.clone(), self.finished.iter().map(count).sum());
+            *summary.counts.entry(topic.name.clone()).or_insert(0) += self.finished.iter().map(count).sum::<u64>();
         }
         summary
     }
@@ -240,18 +244,32 @@ impl Storage {
         }
     }
 
-    fn information(&self) -> BagInformation {
-        let summary = self.bag_summary();
-        let topics = self.topics.iter().map(|(topic, _)| TopicCount {
-            topic_metadata: TopicMetadata {
+    /// Each topic once, although channels may differ in more than rosbag2 knows of.
+    fn topic_counts(&self) -> Vec<TopicCount> {
+        let mut places = BTreeMap::new();
+        let mut topics: Vec<TopicCount> = Vec::new();
+        for (topic, ids) in &self.topics {
+            let count = |f: &Finished| f.summary.counts.get(&ids.channel).copied().unwrap_or(0);
+            let message_count = self.finished.iter().map(count).sum::<u64>();
+            let place = *places.entry((&topic.name, &topic.type_name)).or_insert(topics.len());
+            if let Some(known) = topics.get_mut(place) {
+                known.message_count += message_count;
+                continue;
+            }
+            let topic_metadata = TopicMetadata {
                 name: topic.name.clone(),
                 type_name: topic.type_name.clone(),
                 serialization_format: topic.message_encoding.clone(),
                 offered_qos_profiles: topic.qos.clone(),
-                type_description_hash: topic.type_hash.clone(),
-            },
-            message_count: summary.counts.get(&topic.name).copied().unwrap_or(0),
-        });
+                type_description_hash: topic.type_hash().to_owned(),
+            };
+            topics.push(TopicCount { topic_metadata, message_count });
+        }
+        topics
+    }
+
+    fn information(&self) -> BagInformation {
+        let summary = self.bag_summary();
         let mut custom_data = self.options.custom_data.clone();
         custom_data.insert("lost_messages".to_owned(), summary.lost.to_string());
         BagInformation {
@@ -260,7 +278,7 @@ impl Storage {
             duration: Nanoseconds { nanoseconds: summary.end - summary.start },
             starting_time: SinceEpoch { nanoseconds_since_epoch: summary.start },
             message_count: summary.messages,
-            topics_with_message_count: topics.collect(),
+            topics_with_message_count: self.topic_counts(),
             compression_format: String::new(),
             compression_mode: String::new(),
             relative_file_paths: self.finished.iter().map(|f| f.name.clone()).collect(),
@@ -334,7 +352,7 @@ fn drain(shared: &Shared) -> u64 {
     state.stopped = true;
     let queued = state.queue.drain(..).map(|job| match job {
         Job::Chunk(chunk) => chunk.messages,
-        Job::Topic(..) | Job::Metadata(_) | Job::Split => 0,
+        Job::Topic(..) | Job::Metadata(_) | Job::Attachment(_) | Job::Split => 0,
     });
     let lost = queued.sum::<u64>() + state.front.messages;
     state.front.clear();

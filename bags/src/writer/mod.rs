@@ -3,7 +3,7 @@
 mod disk;
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, HashMap, VecDeque},
     fs,
     path::{Path, PathBuf},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
@@ -11,15 +11,16 @@ use std::{
     time::Duration,
 };
 
+use mcap::records::{MessageHeader, Metadata};
+
 use crate::{
     error::{BagError, Result},
     file::{
         chunk::{Chunk, Compression, Compressor},
-        records::{MessageHeader, Metadata},
         writer::TopicIds,
     },
-    reader::Message,
-    topic::Topic,
+    reader::{Attachment, Message},
+    topic::{Definition, Topic, TopicKey},
 };
 
 /// Finished chunks that may wait for the disk before `write` blocks.
@@ -42,6 +43,8 @@ pub struct BagOptions {
     pub max_file_duration: Option<Duration>,
     /// Snapshot mode: keep this many bytes in memory and store them on [`BagWriter::snapshot`].
     pub snapshot_bytes: Option<usize>,
+    /// MCAP profile.
+    pub profile: String,
     /// Pairs for `custom_data` in `metadata.yaml`.
     pub custom_data: BTreeMap<String, String>,
     /// ROS distribution named in `metadata.yaml`.
@@ -58,6 +61,7 @@ impl Default for BagOptions {
             max_file_bytes: None,
             max_file_duration: None,
             snapshot_bytes: None,
+            profile: "ros2".to_owned(),
             custom_data: BTreeMap::new(),
             ros_distro: "jazzy".to_owned(),
         }
@@ -142,6 +146,7 @@ impl Losses {
 enum Job {
     Topic(Arc<Topic>, TopicIds),
     Metadata(Metadata),
+    Attachment(Box<Attachment>),
     Chunk(Chunk),
     Split,
 }
@@ -155,7 +160,8 @@ struct TopicState {
 #[derive(Default)]
 struct State {
     topics: Vec<TopicState>,
-    schemas: BTreeMap<(String, String), u16>,
+    ids: HashMap<TopicKey, TopicId>,
+    schemas: HashMap<(String, Definition), u16>,
     front: Chunk,
     spare: Vec<Chunk>,
     queue: VecDeque<Job>,
@@ -262,34 +268,40 @@ impl BagWriter {
         &self.dir
     }
 
-    /// Adds a topic; the same name and type again give the same id.
+    /// Adds a topic; the same one again gives the same id.
     ///
     /// # Errors
-    /// [`BagError::Topic`] when the name is there with another type, or at 65 535 topics.
+    /// [`BagError::Topic`] at 65 535 topics.
     pub fn add_topic(&self, topic: &Topic) -> Result<TopicId> {
-        let refuse = |reason: String| BagError::Topic { topic: topic.name.clone(), reason };
+        let topic = Arc::new(topic.in_words());
         let mut state = self.shared.lock();
-        if let Some(at) = state.topics.iter().position(|t| t.topic.name == topic.name) {
-            let known = &state.topics[at].topic.type_name;
-            if *known != topic.type_name {
-                return Err(refuse(format!("is {known} in this bag, not {}", topic.type_name)));
-            }
-            return Ok(TopicId(at as u16));
+        if let Some(id) = state.ids.get(&topic.key()) {
+            return Ok(*id);
         }
-        let channel = u16::try_from(state.topics.len())
-            .ok()
-            .filter(|id| *id < u16::MAX)
-            .ok_or_else(|| refuse(format!("a bag holds at most {} topics", u16::MAX)))?;
-        let key = (topic.type_name.clone(), topic.schema.clone());
+        let channel = u16::try_from(state.topics.len()).ok().filter(|id| *id < u16::MAX);
+        let channel = channel.ok_or_else(|| BagError::Topic {
+            topic: topic.name.clone(),
+            reason: format!("a bag holds at most {} topics", u16::MAX),
+        })?;
+        // There are no more schemas than topics.
         let next = state.schemas.len() as u16 + 1;
-        let schema = *state.schemas.entry(key).or_insert(next);
+        let schema = topic
+            .definition
+            .clone()
+            .map_or(0, |definition| *state.schemas.entry((topic.type_name.clone(), definition)).or_insert(next));
         let ids = TopicIds { channel, schema, new_schema: schema == next };
-        let topic = Arc::new(topic.clone());
         state.queue.push_back(Job::Topic(Arc::clone(&topic), ids));
+        state.ids.insert(topic.key(), TopicId(channel));
         state.topics.push(TopicState { topic, sequence: 0, lost: 0 });
         drop(state);
         self.shared.work.notify_one();
         Ok(TopicId(channel))
+    }
+
+    /// Copies an attachment of another bag, byte for byte, into the file that is being written.
+    pub fn add_attachment(&self, attachment: &Attachment) {
+        self.shared.lock().queue.push_back(Job::Attachment(Box::new(attachment.clone())));
+        self.shared.work.notify_one();
     }
 
     /// Adds a metadata record, which every file of the bag will hold.

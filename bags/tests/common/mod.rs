@@ -2,6 +2,9 @@
 #![allow(dead_code, reason = "each test binary uses some of these")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
+pub mod conformance;
+pub mod contents;
+pub mod mutate;
 pub mod program;
 
 use std::{
