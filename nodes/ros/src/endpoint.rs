@@ -5,9 +5,10 @@ use std::convert::Infallible;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Wake, Waker};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rustdds::bytes::Bytes;
+use rustdds::dds::{ReadError, WriteError};
 use rustdds::no_key::{
     DataWriter, Decode, DefaultDecoder, DeserializedCacheChange, DeserializerAdapter, SerializerAdapter,
     SimpleDataReader,
@@ -15,7 +16,10 @@ use rustdds::no_key::{
 use rustdds::{GUID, RTPSEntity as _, RepresentationIdentifier, SampleIdentity, Timestamp, WriteOptionsBuilder};
 
 use crate::error::RosError;
+use crate::notices::Trouble;
+use crate::qos::SEND_TIMEOUT;
 use crate::roster::{Direction, Roster};
+use crate::rtps::Prefix;
 use crate::signal::{Signal, lock};
 
 /// A message as it travels: four bytes that name the encoding, then the encoded message.
@@ -62,6 +66,13 @@ pub(crate) fn header_with_room(payload: usize) -> Vec<u8> {
 /// Identity of a writer or reader: 12 bytes of its process, 4 of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Gid(pub [u8; 16]);
+
+impl Gid {
+    /// The half that all endpoints of a process have in common.
+    pub(crate) fn prefix(self) -> Prefix {
+        std::array::from_fn(|index| self.0[index])
+    }
+}
 
 impl From<GUID> for Gid {
     fn from(guid: GUID) -> Self {
@@ -157,9 +168,11 @@ pub struct RawPublisher {
 impl RawPublisher {
     /// Sends a message of little-endian CDR bytes, encapsulation header included.
     ///
+    /// A reader that does not acknowledge thousands of samples is waited for: by a node of a mission until it is clear
+    /// that it lags, from then on it is not waited for any more; by any other node for [`crate::qos::SEND_TIMEOUT`].
+    ///
     /// # Errors
-    /// If the bytes are encoded in another way, or a reader has been lagging for
-    /// [`crate::qos::SEND_TIMEOUT`].
+    /// If the bytes are encoded in another way, or readers were waited for in vain.
     pub fn publish(&self, cdr: Cdr) -> Result<(), RosError> {
         self.send(cdr, None).map(|_| ())
     }
@@ -171,13 +184,22 @@ impl RawPublisher {
                 reason: "only little-endian CDR can be sent".to_owned(),
             });
         }
-        let mut options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
-        if let Some(related) = related {
-            options = options.related_sample_identity(related);
+        let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
+        let options = options.related_sample_identity_opt(related).build();
+        let (start, mut cdr) = (Instant::now(), cdr);
+        loop {
+            // Each attempt waits for `BLOCKING`.
+            match self.writer.write_with_options(cdr, options.clone()) {
+                Ok(identity) => return Ok(identity),
+                Err(WriteError::WouldBlock { data }) if start.elapsed() < SEND_TIMEOUT => {
+                    self.roster.let_go_readers(self.gid(), &self.topic);
+                    cdr = data;
+                }
+                Err(error) => {
+                    return Err(RosError::Send { topic: self.topic.clone(), reason: error.to_string() });
+                }
+            }
         }
-        self.writer
-            .write_with_options(cdr, options.build())
-            .map_err(|error| RosError::Send { topic: self.topic.clone(), reason: error.to_string() })
     }
 
     /// Waits until every reliable reader has all samples, and tells whether that is so.
@@ -252,7 +274,8 @@ impl RawSubscription {
 
     /// The next sample, if there is one.
     ///
-    /// Once it has returned nothing, the next sample to come raises the node's [`Signal`].
+    /// Once it has returned nothing, the next sample to come raises the node's [`Signal`]. Samples of an unknown
+    /// encoding are passed over and counted (`Node::notices`).
     pub fn take(&self) -> Result<Option<RawSample>, RosError> {
         // A node that reads many topics asks them all whenever one has news: this makes it cheap.
         if self.bell.quiet.load(Ordering::Acquire) {
@@ -272,15 +295,32 @@ impl RawSubscription {
     }
 
     fn try_take(&self) -> Result<Option<RawSample>, RosError> {
-        let sample = self
-            .reader
-            .try_take_one()
-            .map_err(|error| RosError::Receive { topic: self.topic.clone(), reason: error.to_string() })?;
-        Ok(sample.map(|change| {
-            let sample = raw_sample(change);
-            lock(&self.losses).note(&sample.info);
-            sample
-        }))
+        loop {
+            match self.reader.try_take_one() {
+                Ok(change) => {
+                    return Ok(change.map(|change| {
+                        let sample = raw_sample(change);
+                        lock(&self.losses).note(&sample.info);
+                        sample
+                    }));
+                }
+                // The reader has gone on to the next sample.
+                Err(ReadError::Deserialization { reason }) => self.note_unreadable(|| reason),
+                Err(error) => {
+                    return Err(RosError::Receive { topic: self.topic.clone(), reason: error.to_string() });
+                }
+            }
+        }
+    }
+
+    /// Counts a sample that is no message.
+    pub(crate) fn note_unreadable(&self, reason: impl FnOnce() -> String) {
+        self.roster.notices.note(Trouble::Unreadable, &self.topic, reason);
+    }
+
+    /// What this process knows of the others.
+    pub(crate) fn roster(&self) -> &Roster {
+        &self.roster
     }
 
     /// From now on this subscription raises that signal and no longer the node's.

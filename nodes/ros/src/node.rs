@@ -4,25 +4,28 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Publisher as DdsPublisher, QosPolicies, RTPSEntity as _,
-    Subscriber as DdsSubscriber, TopicKind,
-};
+use rustdds::no_key::DataWriter;
+use rustdds::{RTPSEntity as _, Timestamp};
 use swath_msgs::{RosMessage, RosService};
 
-use crate::background::Background;
+use crate::background::{Background, Fault, Hearing};
 use crate::cli::RosArgs;
 use crate::clock::SimClock;
+use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
 use crate::endpoint::{Adapter, Cdr, Gid, RawPublisher, RawSubscription};
 use crate::environment::Environment;
 use crate::error::RosError;
 use crate::graph::{self, Entry};
 use crate::logging;
+use crate::members::{Identity, Members};
+use crate::message::encode_as;
+use crate::minder::Minder;
 use crate::names::{Names, dds_service, dds_topic, dds_type};
+use crate::notices::Notice;
 use crate::param_services::ParameterServices;
 use crate::params::{Parameters, Spec};
-use crate::qos::{Profile, QosProfile, policies, with_depth};
+use crate::qos::{Profile, QosProfile, with_depth};
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
 use crate::signal::{Signal, lock};
@@ -37,6 +40,10 @@ const SETTLING: Duration = Duration::from_millis(300);
 const ANNOUNCEMENTS: &str = "ros_discovery_info";
 const ANNOUNCEMENT_TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 
+/// Where nodes of ours say who they are; no topic of the ROS graph.
+const IDENTITIES: &str = "swath_identity";
+const IDENTITY_TYPE: &str = "swath_msgs/msg/Identity";
+
 /// A ROS 2 node.
 ///
 /// Drop its publishers, subscriptions, servers and clients before the node itself.
@@ -44,6 +51,7 @@ pub struct Node {
     // Fields are dropped in this order: the thread first, the participant last.
     background: Background,
     endpoints: Mutex<Vec<(Direction, Gid, Entry)>>,
+    introduction: DataWriter<Cdr, Adapter>,
     roster: Arc<Roster>,
     parameters: Parameters,
     clock: SimClock,
@@ -51,13 +59,6 @@ pub struct Node {
     names: Names,
     environment: Environment,
     dds: Dds,
-}
-
-/// What endpoints are made with.
-struct Dds {
-    publisher: DdsPublisher,
-    subscriber: DdsSubscriber,
-    participant: DomainParticipant,
 }
 
 impl Node {
@@ -73,39 +74,50 @@ impl Node {
     /// As [`Self::start`], in an environment of the caller's choice.
     pub fn start_in(environment: Environment, name: &str, args: &RosArgs) -> Result<Self, RosError> {
         let names = args.names(graph::NAMESPACE, name)?;
+        let parameters = Parameters::new(args, &names);
+        let (identity, members) = declare_identity(name, &names, &parameters)?;
         let dds = Dds::new(&environment)?;
+        let minder = Arc::new(Minder::new(&dds.participant)?);
         let signal = Signal::new();
-        let qos = Profile::Latched.qos();
+        let latched = Profile::Latched.qos();
+        let announcement_type = dds_type(ANNOUNCEMENT_TYPE)?;
+        let announcer = dds.writer(ANNOUNCEMENTS, &announcement_type, &latched)?;
         let own = Gid::from(dds.participant.guid());
-        let dds_type = dds_type(ANNOUNCEMENT_TYPE)?;
-        let announcer = dds.writer(ANNOUNCEMENTS, &dds_type, &qos)?;
-        let roster = Arc::new(Roster::new(own, names.clone(), announcer));
-        let announcements = RawSubscription::new(
-            dds.reader(ANNOUNCEMENTS, &dds_type, &with_depth(qos, 256))?,
-            ANNOUNCEMENTS.to_owned(),
-            Arc::clone(&roster),
-            &signal,
-        );
-        let background = Background::start(&dds.participant, Arc::clone(&roster), announcements, signal.clone())?;
+        let is_member = graph::MEMBERS.contains(&name);
+        let roster = Roster::new(own, names.clone(), announcer, Arc::clone(&minder), members, is_member);
+        let roster = Arc::new(roster);
+        let listen = |topic: &str, type_name: &str| -> Result<RawSubscription, RosError> {
+            let reader = dds.reader(topic, type_name, &with_depth(latched.clone(), 256))?;
+            Ok(RawSubscription::new(reader, topic.to_owned(), Arc::clone(&roster), &signal))
+        };
+        let identity_type = dds_type(IDENTITY_TYPE)?;
+        let hearing = Hearing {
+            listener: dds.participant.status_listener(),
+            announcements: listen(ANNOUNCEMENTS, &announcement_type)?,
+            identities: listen(IDENTITIES, &identity_type)?,
+        };
+        let background = Background::start(hearing, Arc::clone(&roster), minder, signal.clone())?;
         let node = Self {
             background,
             endpoints: Mutex::default(),
+            introduction: dds.writer(IDENTITIES, &identity_type, &latched)?,
             roster,
-            parameters: Parameters::new(args, &names),
+            parameters,
             clock: SimClock::default(),
             signal,
             names,
             environment,
             dds,
         };
-        node.come_up(args)?;
+        node.come_up(args, &identity)?;
         Ok(node)
     }
 
-    fn come_up(&self, args: &RosArgs) -> Result<(), RosError> {
+    fn come_up(&self, args: &RosArgs, identity: &Identity) -> Result<(), RosError> {
         if self.roster.wait_until(Instant::now() + LISTENING, || self.roster.namesake().is_some()) {
             return Err(self.duplicate());
         }
+        self.introduce(identity)?;
         self.roster.announce();
         let rosout = match args.rosout() {
             true => Some(Arc::new(self.publisher(&graph::ROSOUT)?)),
@@ -118,6 +130,13 @@ impl Node {
         self.parameters.declare(use_sim_time.read_only())?;
         self.background.serve(self.parameter_services()?);
         Ok(())
+    }
+
+    fn introduce(&self, identity: &Identity) -> Result<(), RosError> {
+        let cdr = encode_as(IDENTITY_TYPE, identity)?;
+        self.introduction
+            .write(cdr, Some(Timestamp::now()))
+            .map_err(|error| RosError::Send { topic: IDENTITIES.to_owned(), reason: error.to_string() })
     }
 
     fn parameter_services(&self) -> Result<ParameterServices, RosError> {
@@ -157,7 +176,7 @@ impl Node {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
         self.remember(Direction::Read, raw.gid(), topic.entry);
-        Ok(Subscription::new(raw))
+        Ok(Subscription::new(raw, topic.entry.writers))
     }
 
     /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type
@@ -231,10 +250,29 @@ impl Node {
     /// See [`Signal::wait`]: take from each subscription until it has nothing, then wait.
     ///
     /// # Errors
-    /// If this node has to go because another one has its name.
+    /// As [`Self::check`].
     pub fn wait(&self, timeout: Duration) -> Result<bool, RosError> {
         let news = self.signal.wait(timeout);
-        if self.background.must_yield() { Err(self.duplicate()) } else { Ok(news) }
+        self.check()?;
+        Ok(news)
+    }
+
+    /// Looks whether this node may go on; for those who wait for its signal themselves.
+    ///
+    /// # Errors
+    /// If another node that came up together with it has its name, or if its DDS has died.
+    pub fn check(&self) -> Result<(), RosError> {
+        match self.background.fault() {
+            None => Ok(()),
+            Some(Fault::Namesake) => Err(self.duplicate()),
+            Some(Fault::Deaf) => Err(RosError::Deaf { node: self.names.fully_qualified() }),
+        }
+    }
+
+    /// What went wrong with the messages of others since this was last called: each kind on each topic at most once
+    /// in five seconds, with how often it happened. Nothing of it is a reason to stop.
+    pub fn notices(&self) -> Vec<Notice> {
+        self.roster.notices.take(Instant::now())
     }
 
     /// Waits until each of the nodes (as the table names them, in this namespace) is matched on
@@ -336,54 +374,16 @@ impl Drop for Node {
     }
 }
 
-impl Dds {
-    fn new(environment: &Environment) -> Result<Self, RosError> {
-        let what = format!("a participant in domain {}", environment.domain);
-        let failed = |error: rustdds::dds::CreateError| create_error(&what, &error);
-        let mut builder = DomainParticipantBuilder::new(environment.domain);
-        if let Some(networks) = environment.networks() {
-            builder = builder.with_only_networks(networks);
-        }
-        let participant = builder.build().map_err(failed)?;
-        let none = QosPolicies::builder().build();
-        let publisher = participant.create_publisher(&none).map_err(failed)?;
-        let subscriber = participant.create_subscriber(&none).map_err(failed)?;
-        Ok(Self { publisher, subscriber, participant })
-    }
-
-    fn writer(
-        &self,
-        topic: &str,
-        type_name: &str,
-        qos: &QosProfile,
-    ) -> Result<rustdds::no_key::DataWriter<Cdr, Adapter>, RosError> {
-        let what = format!("a writer of {topic}");
-        let policies = policies(qos);
-        let topic = self.topic(topic, type_name, &policies)?;
-        self.publisher.create_datawriter_no_key(&topic, Some(policies)).map_err(|error| create_error(&what, &error))
-    }
-
-    fn reader(
-        &self,
-        topic: &str,
-        type_name: &str,
-        qos: &QosProfile,
-    ) -> Result<rustdds::no_key::SimpleDataReader<Cdr, Adapter>, RosError> {
-        let what = format!("a reader of {topic}");
-        let policies = policies(qos);
-        let topic = self.topic(topic, type_name, &policies)?;
-        self.subscriber
-            .create_simple_datareader_no_key(&topic, Some(policies))
-            .map_err(|error| create_error(&what, &error))
-    }
-
-    fn topic(&self, name: &str, type_name: &str, policies: &QosPolicies) -> Result<rustdds::Topic, RosError> {
-        self.participant
-            .create_topic(name.to_owned(), type_name.to_owned(), policies, TopicKind::NoKey)
-            .map_err(|error| create_error(&format!("the topic {name}"), &error))
-    }
-}
-
-fn create_error(what: &str, error: &rustdds::dds::CreateError) -> RosError {
-    RosError::Create { what: what.to_owned(), reason: error.to_string() }
+/// Declares the parameters that say who belongs to the mission.
+fn declare_identity(name: &str, names: &Names, parameters: &Parameters) -> Result<(Identity, Members), RosError> {
+    let fleet = "Nodes of a mission say the same; messages of others do not count. The launcher chooses it.";
+    let fleet: String = parameters.declare(Spec::new("fleet", String::new(), fleet).read_only())?;
+    let epoch = "How often the node was started in this mission: of two with one name, the later start counts.";
+    let epoch = Spec::new("epoch", 0_i64, epoch).in_range(0.0..=9e15).read_only();
+    let epoch = parameters.declare(epoch)?.unsigned_abs();
+    let external = "Nodes of the table whose place another program takes: its messages count by its name in ROS.";
+    let external: Vec<String> = parameters.declare(Spec::new("external", Vec::new(), external).read_only())?;
+    let namespace = names.namespace().to_owned();
+    let members = Members::new(&namespace, fleet.clone(), external);
+    Ok((Identity { namespace, node: name.to_owned(), fleet, epoch }, members))
 }
