@@ -1,28 +1,25 @@
 //! The thread of a node that watches the domain and answers for its parameters.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 use futures_core::Stream as _;
-use rustdds::{DomainParticipantStatusListener, StatusEvented as _};
+use rustdds::{DomainParticipantStatusListener, RTPSEntity as _, StatusEvented as _};
 
-use crate::endpoint::{RawSample, RawSubscription};
+use crate::dds::Dds;
+use crate::endpoint::{Gid, RawSample, RawSubscription};
 use crate::error::RosError;
+use crate::health::{ASK_EVERY, Ailment, Health};
 use crate::members::Identity;
 use crate::message::decode_as;
 use crate::minder::Minder;
 use crate::param_services::ParameterServices;
 use crate::roster::Roster;
 use crate::signal::{Signal, lock};
-
-/// How often RustDDS is asked whether it still hears and speaks.
-const ASK_EVERY: Duration = Duration::from_secs(1);
-/// So many questions in a row without an answer, and RustDDS is taken for dead.
-const UNANSWERED: u32 = 5;
 
 /// The running thread; dropping it ends it.
 pub(crate) struct Background {
@@ -54,6 +51,7 @@ struct Shared {
     node_signal: Signal,
     stop: AtomicBool,
     fault: Mutex<Option<Fault>>,
+    dds: Arc<Dds>,
     roster: Arc<Roster>,
     minder: Arc<Minder>,
     services: Mutex<Option<ParameterServices>>,
@@ -63,6 +61,7 @@ impl Background {
     /// Starts the thread; `node_signal` is raised when it has become known who counts, and when the node has to go.
     pub(crate) fn start(
         mut hearing: Hearing,
+        dds: Arc<Dds>,
         roster: Arc<Roster>,
         minder: Arc<Minder>,
         node_signal: Signal,
@@ -75,6 +74,7 @@ impl Background {
             node_signal,
             stop: AtomicBool::new(false),
             fault: Mutex::new(None),
+            dds,
             roster,
             minder,
             services: Mutex::new(None),
@@ -82,7 +82,7 @@ impl Background {
         let running = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("ros".to_owned())
-            .spawn(move || running.run(&hearing))
+            .spawn(move || running.run(hearing))
             .map_err(|source| RosError::System { what: "no thread for the node", source })?;
         Ok(Self { shared, thread: Some(thread) })
     }
@@ -112,16 +112,9 @@ impl Drop for Background {
     }
 }
 
-/// The questions to RustDDS.
-#[derive(Default)]
-struct Questions {
-    asked: Option<Instant>,
-    unanswered: u32,
-}
-
 impl Shared {
-    fn run(&self, hearing: &Hearing) {
-        let mut questions = Questions::default();
+    fn run(&self, mut hearing: Hearing) {
+        let mut health = Health::new();
         while !self.stop.load(Ordering::Relaxed) {
             self.take_events(&hearing.listener);
             let before = self.roster.revision();
@@ -139,7 +132,13 @@ impl Shared {
             {
                 tracing::warn!("parameters: {error}");
             }
-            self.question(&mut questions);
+            if let Some(ailment) = health.examine(&self.minder, &self.roster) {
+                match self.renew(ailment) {
+                    Ok(listener) => hearing.listener = listener,
+                    Err(fault) => self.fail(fault),
+                }
+                health = Health::after(health);
+            }
             self.signal.wait(ASK_EVERY);
         }
     }
@@ -152,25 +151,32 @@ impl Shared {
         }
     }
 
-    /// Asks RustDDS whether it hears and speaks, once in a while.
-    fn question(&self, questions: &mut Questions) {
-        let now = Instant::now();
-        if questions.asked.is_some_and(|asked| now.duration_since(asked) < ASK_EVERY) {
-            return;
+    /// Gives the node another participant, in whose place all its endpoints go on.
+    fn renew(&self, ailment: Ailment) -> Result<DomainParticipantStatusListener, Fault> {
+        if ailment == Ailment::Incurable {
+            return Err(Fault::Deaf);
         }
-        let (acknowledged, probed) = (self.minder.acknowledged(), self.roster.take_probed());
-        if questions.asked.is_none() || (acknowledged && probed) {
-            questions.unanswered = 0;
-        } else {
-            questions.unanswered += 1;
-            tracing::debug!("RustDDS does not answer: event loop {acknowledged}, discovery {probed}");
-            self.minder.announce();
-        }
-        if questions.unanswered >= UNANSWERED {
-            self.fail(Fault::Deaf);
-        }
-        questions.asked = Some(now);
-        self.minder.ask();
+        // What has panicked once may do so again when it is taken apart.
+        let renewed = catch_unwind(AssertUnwindSafe(|| {
+            self.roster.retire();
+            self.dds.renew()
+        }));
+        let renewed = match renewed {
+            Ok(Ok(renewed)) => renewed,
+            Ok(Err(error)) => {
+                tracing::error!("DDS cannot be started anew: {error}");
+                return Err(Fault::Deaf);
+            }
+            Err(_) => return Err(Fault::Deaf),
+        };
+        let listener = renewed.participant.status_listener();
+        self.roster.renew(Gid::from(renewed.participant.guid()), &renewed.gids);
+        self.minder.turn_to(&renewed.participant);
+        renewed.resume();
+        self.roster.announce();
+        self.roster.note_renewal(ailment.reason());
+        self.node_signal.raise();
+        Ok(listener)
     }
 
     fn take_events(&self, listener: &DomainParticipantStatusListener) {

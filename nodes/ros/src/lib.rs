@@ -33,6 +33,7 @@
 //! an asynchronous executor.
 
 mod background;
+mod cdr;
 mod cli;
 mod clock;
 mod dds;
@@ -42,6 +43,7 @@ mod environment;
 mod error;
 pub mod graph;
 mod guests;
+mod health;
 mod logging;
 mod members;
 mod message;
@@ -57,13 +59,15 @@ mod rtps;
 mod service;
 mod shutdown;
 mod signal;
+mod slot;
 mod topic;
 mod value;
 
+pub use cdr::{Cdr, HEADER_LENGTH};
 pub use cli::RosArgs;
 pub use clock::{SimClock, stamp};
 pub use discovered::RemoteWriter;
-pub use endpoint::{Cdr, Gid, HEADER_LENGTH, RawPublisher, RawSample, RawSubscription, SampleInfo};
+pub use endpoint::{Gid, RawPublisher, RawSample, RawSubscription, SampleInfo};
 pub use environment::Environment;
 pub use error::RosError;
 pub use message::{decode, encode};

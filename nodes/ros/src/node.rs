@@ -1,10 +1,9 @@
 //! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rustdds::no_key::DataWriter;
 use rustdds::{RTPSEntity as _, Timestamp};
 use swath_msgs::{RosMessage, RosService};
 
@@ -13,7 +12,7 @@ use crate::cli::RosArgs;
 use crate::clock::SimClock;
 use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
-use crate::endpoint::{Adapter, Cdr, Gid, RawPublisher, RawSubscription};
+use crate::endpoint::{Gid, RawPublisher, RawSubscription};
 use crate::environment::Environment;
 use crate::error::RosError;
 use crate::graph::{self, Entry};
@@ -28,7 +27,8 @@ use crate::params::{Parameters, Spec};
 use crate::qos::{Profile, QosProfile, with_depth};
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
-use crate::signal::{Signal, lock};
+use crate::signal::Signal;
+use crate::slot::{Plan, WriterSlot};
 use crate::topic::{Publisher, Subscription};
 
 /// How long a new node listens for another one of its name before it shows itself.
@@ -50,15 +50,14 @@ const IDENTITY_TYPE: &str = "swath_msgs/msg/Identity";
 pub struct Node {
     // Fields are dropped in this order: the thread first, the participant last.
     background: Background,
-    endpoints: Mutex<Vec<(Direction, Gid, Entry)>>,
-    introduction: DataWriter<Cdr, Adapter>,
+    introduction: Arc<WriterSlot>,
     roster: Arc<Roster>,
     parameters: Parameters,
     clock: SimClock,
     signal: Signal,
     names: Names,
     environment: Environment,
-    dds: Dds,
+    dds: Arc<Dds>,
 }
 
 impl Node {
@@ -76,39 +75,29 @@ impl Node {
         let names = args.names(graph::NAMESPACE, name)?;
         let parameters = Parameters::new(args, &names);
         let (identity, members) = declare_identity(name, &names, &parameters)?;
-        let dds = Dds::new(&environment)?;
-        let minder = Arc::new(Minder::new(&dds.participant)?);
+        let dds = Arc::new(Dds::new(&environment)?);
+        let participant = dds.participant();
+        let minder = Arc::new(Minder::new(&participant)?);
         let signal = Signal::new();
         let latched = Profile::Latched.qos();
-        let announcement_type = dds_type(ANNOUNCEMENT_TYPE)?;
-        let announcer = dds.writer(ANNOUNCEMENTS, &announcement_type, &latched)?;
-        let own = Gid::from(dds.participant.guid());
+        let announcer = dds.writer(plan(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE, &latched)?)?;
+        let own = Gid::from(participant.guid());
         let is_member = graph::MEMBERS.contains(&name);
         let roster = Roster::new(own, names.clone(), announcer, Arc::clone(&minder), members, is_member);
         let roster = Arc::new(roster);
         let listen = |topic: &str, type_name: &str| -> Result<RawSubscription, RosError> {
-            let reader = dds.reader(topic, type_name, &with_depth(latched.clone(), 256))?;
+            let reader = dds.reader(plan(topic, type_name, &with_depth(latched.clone(), 256))?)?;
             Ok(RawSubscription::new(reader, topic.to_owned(), Arc::clone(&roster), &signal))
         };
-        let identity_type = dds_type(IDENTITY_TYPE)?;
         let hearing = Hearing {
-            listener: dds.participant.status_listener(),
-            announcements: listen(ANNOUNCEMENTS, &announcement_type)?,
-            identities: listen(IDENTITIES, &identity_type)?,
+            listener: participant.status_listener(),
+            announcements: listen(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE)?,
+            identities: listen(IDENTITIES, IDENTITY_TYPE)?,
         };
-        let background = Background::start(hearing, Arc::clone(&roster), minder, signal.clone())?;
-        let node = Self {
-            background,
-            endpoints: Mutex::default(),
-            introduction: dds.writer(IDENTITIES, &identity_type, &latched)?,
-            roster,
-            parameters,
-            clock: SimClock::default(),
-            signal,
-            names,
-            environment,
-            dds,
-        };
+        let introduction = dds.writer(plan(IDENTITIES, IDENTITY_TYPE, &latched)?)?;
+        let background = Background::start(hearing, Arc::clone(&dds), Arc::clone(&roster), minder, signal.clone())?;
+        let clock = SimClock::default();
+        let node = Self { background, introduction, roster, parameters, clock, signal, names, environment, dds };
         node.come_up(args, &identity)?;
         Ok(node)
     }
@@ -135,7 +124,8 @@ impl Node {
     fn introduce(&self, identity: &Identity) -> Result<(), RosError> {
         let cdr = encode_as(IDENTITY_TYPE, identity)?;
         self.introduction
-            .write(cdr, Some(Timestamp::now()))
+            .write(cdr, Some(Timestamp::now()).into())
+            .map(|_| ())
             .map_err(|error| RosError::Send { topic: IDENTITIES.to_owned(), reason: error.to_string() })
     }
 
@@ -158,7 +148,7 @@ impl Node {
     pub fn publisher<M: RosMessage>(&self, topic: &graph::Topic<M>) -> Result<Publisher<M>, RosError> {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_publisher(name, type_name, &profile.qos())?;
-        self.remember(Direction::Write, raw.gid(), topic.entry);
+        self.roster.remember(Direction::Write, raw.gid(), topic.entry);
         Ok(Publisher::new(raw))
     }
 
@@ -175,7 +165,7 @@ impl Node {
     ) -> Result<Subscription<M>, RosError> {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
-        self.remember(Direction::Read, raw.gid(), topic.entry);
+        self.roster.remember(Direction::Read, raw.gid(), topic.entry);
         Ok(Subscription::new(raw, topic.entry.writers))
     }
 
@@ -183,14 +173,14 @@ impl Node {
     /// `type_name` (such as `std_msgs/msg/Header`).
     pub fn raw_publisher(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawPublisher, RosError> {
         let topic = self.names.resolve(name)?;
-        self.writer(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
+        self.writer(topic.clone(), &dds_topic(&topic), type_name, qos)
     }
 
     /// A reader of CDR bytes from the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
     pub fn raw_subscription(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawSubscription, RosError> {
         let topic = self.names.resolve(name)?;
-        self.reader(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
+        self.reader(topic.clone(), &dds_topic(&topic), type_name, qos)
     }
 
     /// A server of a service.
@@ -198,10 +188,8 @@ impl Node {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
         let qos = Profile::Service.qos();
-        let request_type = dds_type(S::Request::TYPE_NAME)?;
-        let response_type = dds_type(S::Response::TYPE_NAME)?;
-        let requests = self.reader(name.clone(), &request_topic, &request_type, &qos)?;
-        let responses = self.writer(name, &response_topic, &response_type, &qos)?;
+        let requests = self.reader(name.clone(), &request_topic, S::Request::TYPE_NAME, &qos)?;
+        let responses = self.writer(name, &response_topic, S::Response::TYPE_NAME, &qos)?;
         Ok(Server::new(requests, responses, self.environment.mapping))
     }
 
@@ -210,10 +198,8 @@ impl Node {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
         let qos = Profile::Service.qos();
-        let request_type = dds_type(S::Request::TYPE_NAME)?;
-        let response_type = dds_type(S::Response::TYPE_NAME)?;
-        let requests = self.writer(name.clone(), &request_topic, &request_type, &qos)?;
-        let responses = self.reader(name.clone(), &response_topic, &response_type, &qos)?;
+        let requests = self.writer(name.clone(), &request_topic, S::Request::TYPE_NAME, &qos)?;
+        let responses = self.reader(name.clone(), &response_topic, S::Response::TYPE_NAME, &qos)?;
         Ok(Client::new(name, requests, responses, self.environment.mapping))
     }
 
@@ -221,28 +207,24 @@ impl Node {
         &self,
         topic: String,
         dds_topic: &str,
-        dds_type: &str,
+        type_name: &str,
         qos: &QosProfile,
     ) -> Result<RawPublisher, RosError> {
-        let writer = self.dds.writer(dds_topic, dds_type, qos)?;
-        self.roster.enrol(Direction::Write, writer.guid().into());
-        Ok(RawPublisher { writer, topic, roster: Arc::clone(&self.roster) })
+        let writer = self.dds.writer(plan(dds_topic, type_name, qos)?)?;
+        self.roster.enrol(Direction::Write, writer.gid());
+        Ok(RawPublisher::new(writer, topic, Arc::clone(&self.roster)))
     }
 
     fn reader(
         &self,
         topic: String,
         dds_topic: &str,
-        dds_type: &str,
+        type_name: &str,
         qos: &QosProfile,
     ) -> Result<RawSubscription, RosError> {
-        let reader = self.dds.reader(dds_topic, dds_type, qos)?;
-        self.roster.enrol(Direction::Read, reader.guid().into());
+        let reader = self.dds.reader(plan(dds_topic, type_name, qos)?)?;
+        self.roster.enrol(Direction::Read, reader.gid());
         Ok(RawSubscription::new(reader, topic, Arc::clone(&self.roster), &self.signal))
-    }
-
-    fn remember(&self, direction: Direction, gid: Gid, entry: Entry) {
-        lock(&self.endpoints).push((direction, gid, entry));
     }
 
     /// Waits for news on this node's subscriptions, and tells whether there are any.
@@ -283,8 +265,8 @@ impl Node {
     /// If that is not so when the time is over; the error names what is missing.
     pub fn wait_for_peers(&self, nodes: &[&str], timeout: Duration) -> Result<(), RosError> {
         let deadline = Instant::now() + timeout;
-        if !self.roster.wait_until(deadline, || self.missing(nodes).is_empty()) {
-            return Err(RosError::MissingPeers { waited: timeout, missing: self.missing(nodes) });
+        if !self.roster.wait_until(deadline, || self.roster.missing(nodes).is_empty()) {
+            return Err(RosError::MissingPeers { waited: timeout, missing: self.roster.missing(nodes) });
         }
         std::thread::sleep(SETTLING);
         Ok(())
@@ -300,34 +282,6 @@ impl Node {
         Ok(())
     }
 
-    fn missing(&self, nodes: &[&str]) -> Vec<String> {
-        let there = self.roster.nodes();
-        let namespace = self.names.namespace().trim_end_matches('/');
-        let mut missing = Vec::new();
-        for node in nodes {
-            let full = format!("{namespace}/{node}");
-            if !there.contains(&full) {
-                missing.push(format!("node {full} is not there"));
-                continue;
-            }
-            for (direction, gid, entry) in lock(&self.endpoints).iter() {
-                let (others, verb) = match direction {
-                    Direction::Write => (entry.readers, "read"),
-                    Direction::Read => (entry.writers, "write"),
-                };
-                let common = others.contains(node) || (*node == graph::RECORDER && *direction == Direction::Write);
-                let common = common && self.roster.is_enrolled(*direction, *gid);
-                if common && !self.roster.matched_nodes(*gid).contains(&full) {
-                    missing.push(format!("{full} does not {verb} {}", entry.name));
-                }
-            }
-        }
-        if !missing.is_empty() {
-            missing.extend(self.roster.refusals());
-        }
-        missing
-    }
-
     /// Fully qualified names of the nodes of the other processes in the domain.
     pub fn nodes(&self) -> BTreeSet<String> {
         self.roster.nodes()
@@ -335,7 +289,7 @@ impl Node {
 
     /// The topic writers of the other processes in the domain.
     pub fn remote_writers(&self) -> Vec<RemoteWriter> {
-        remote_writers(&self.dds.participant)
+        remote_writers(&self.dds.participant())
     }
 
     /// The parameters of this node.
@@ -386,4 +340,8 @@ fn declare_identity(name: &str, names: &Names, parameters: &Parameters) -> Resul
     let namespace = names.namespace().to_owned();
     let members = Members::new(&namespace, fleet.clone(), external);
     Ok((Identity { namespace, node: name.to_owned(), fleet, epoch }, members))
+}
+
+fn plan(dds_topic: &str, type_name: &str, qos: &QosProfile) -> Result<Plan, RosError> {
+    Ok(Plan { topic: dds_topic.to_owned(), type_name: dds_type(type_name)?, qos: qos.clone() })
 }

@@ -26,6 +26,8 @@ pub enum Trouble {
     Unsent,
     /// Another process has a node of this node's name.
     Namesake,
+    /// RustDDS was started anew inside this process.
+    Renewed,
 }
 
 impl Trouble {
@@ -37,6 +39,7 @@ impl Trouble {
             Self::Lagging => "reader lags",
             Self::Unsent => "messages unsent",
             Self::Namesake => "another node of this name",
+            Self::Renewed => "DDS started anew",
         }
     }
 }

@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use rustdds::no_key::DataWriter;
 use rustdds::{DomainParticipantStatusEvent, EndpointDescription, Timestamp};
 use swath_msgs::rmw_dds_common::{self, NodeEntitiesInfo, ParticipantEntitiesInfo};
 
-use crate::endpoint::{Adapter, Cdr, Gid};
+use crate::cdr::Cdr;
+use crate::endpoint::Gid;
+use crate::graph::{self, Entry};
 use crate::guests::Guests;
 use crate::members::{Identity, Members, Standing};
 use crate::message::{decode, encode};
@@ -19,6 +20,7 @@ use crate::notices::{Notices, Trouble};
 use crate::qos::is_reliable;
 use crate::rtps::{Described, Prefix};
 use crate::signal::lock;
+use crate::slot::WriterSlot;
 
 /// For how long after a node has shown itself another one of its name counts as one that came at the same time.
 const TOGETHER: Duration = Duration::from_secs(2);
@@ -36,9 +38,8 @@ pub(crate) enum Direction {
 
 /// What a node knows of itself and of the others.
 pub(crate) struct Roster {
-    own: Gid,
     names: Names,
-    announcer: DataWriter<Cdr, Adapter>,
+    announcer: Arc<WriterSlot>,
     minder: Arc<Minder>,
     /// Whether this node belongs to a mission: then only members count and are waited for.
     member: bool,
@@ -50,11 +51,14 @@ pub(crate) struct Roster {
     revision: AtomicU64,
 }
 
-#[derive(Default)]
 struct State {
+    /// This process.
+    own: Gid,
     announced: Option<Instant>,
     readers: BTreeSet<Gid>,
     writers: BTreeSet<Gid>,
+    /// What the table says of our endpoints.
+    table: Vec<(Direction, Gid, Entry)>,
     /// Nodes of the other processes, by participant.
     nodes: BTreeMap<Gid, Vec<NodeEntitiesInfo>>,
     /// Remote endpoints matched with each of ours.
@@ -76,22 +80,35 @@ impl Roster {
     pub(crate) fn new(
         own: Gid,
         names: Names,
-        announcer: DataWriter<Cdr, Adapter>,
+        announcer: Arc<WriterSlot>,
         minder: Arc<Minder>,
         members: Members,
         member: bool,
     ) -> Self {
         Self {
-            own,
             names,
             announcer,
             minder,
             member,
             notices: Notices::default(),
-            state: Mutex::new(State { members, ..State::default() }),
+            state: Mutex::new(State::new(own, members)),
             changed: Condvar::new(),
             revision: AtomicU64::new(0),
         }
+    }
+
+    /// This process has another participant, and its endpoints have other identities; what is known of the others is
+    /// learnt again.
+    pub(crate) fn renew(&self, own: Gid, gids: &BTreeMap<Gid, Gid>) {
+        let renewed = |gid: &Gid| gids.get(gid).copied().unwrap_or(*gid);
+        let mut state = lock(&self.state);
+        let former = std::mem::replace(&mut *state, State::new(own, Members::default()));
+        state.members = former.members;
+        state.readers = former.readers.iter().map(renewed).collect();
+        state.writers = former.writers.iter().map(renewed).collect();
+        state.table = former.table.iter().map(|(way, gid, entry)| (*way, renewed(gid), *entry)).collect();
+        drop(state);
+        self.note_change();
     }
 
     /// Lets the other processes know of this node, now and whenever its endpoints change.
@@ -105,7 +122,7 @@ impl Roster {
     pub(crate) fn retire(&self) {
         let mut state = lock(&self.state);
         if state.announced.take().is_some() {
-            self.send(Vec::new());
+            self.send(state.own, Vec::new());
         }
     }
 
@@ -113,17 +130,14 @@ impl Roster {
         self.change_own(direction, |gids| gids.insert(gid));
     }
 
-    pub(crate) fn withdraw(&self, direction: Direction, gid: Gid) {
-        self.change_own(direction, |gids| gids.remove(&gid));
+    /// An endpoint of ours is one of the table.
+    pub(crate) fn remember(&self, direction: Direction, gid: Gid, entry: Entry) {
+        lock(&self.state).table.push((direction, gid, entry));
     }
 
-    /// Whether this endpoint of ours still exists.
-    pub(crate) fn is_enrolled(&self, direction: Direction, gid: Gid) -> bool {
-        let state = lock(&self.state);
-        match direction {
-            Direction::Write => state.writers.contains(&gid),
-            Direction::Read => state.readers.contains(&gid),
-        }
+    pub(crate) fn withdraw(&self, direction: Direction, gid: Gid) {
+        lock(&self.state).table.retain(|(_, known, _)| *known != gid);
+        self.change_own(direction, |gids| gids.remove(&gid));
     }
 
     fn change_own(&self, direction: Direction, change: impl FnOnce(&mut BTreeSet<Gid>) -> bool) {
@@ -139,19 +153,20 @@ impl Roster {
 
     fn publish(&self, state: &State) {
         let messages = |gids: &BTreeSet<Gid>| gids.iter().map(gid_msg).collect();
-        self.send(vec![NodeEntitiesInfo {
+        let node = NodeEntitiesInfo {
             node_namespace: self.names.namespace().to_owned(),
             node_name: self.names.name().to_owned(),
             reader_gid_seq: messages(&state.readers),
             writer_gid_seq: messages(&state.writers),
-        }]);
+        };
+        self.send(state.own, vec![node]);
     }
 
-    fn send(&self, node_entities_info_seq: Vec<NodeEntitiesInfo>) {
-        let message = ParticipantEntitiesInfo { gid: gid_msg(&self.own), node_entities_info_seq };
-        let sent = encode(&message).map(|cdr| self.announcer.write(cdr, Some(Timestamp::now())));
+    fn send(&self, own: Gid, node_entities_info_seq: Vec<NodeEntitiesInfo>) {
+        let message = ParticipantEntitiesInfo { gid: gid_msg(&own), node_entities_info_seq };
+        let sent = encode(&message).map(|cdr| self.announcer.write(cdr, Some(Timestamp::now()).into()));
         match sent {
-            Ok(Ok(())) => {}
+            Ok(Ok(_)) => {}
             Ok(Err(error)) => tracing::warn!("the node could not be announced: {error}"),
             Err(error) => tracing::warn!("the node could not be announced: {error}"),
         }
@@ -162,8 +177,8 @@ impl Roster {
         match decode::<ParticipantEntitiesInfo>(cdr) {
             Ok(info) => {
                 let participant = Gid(info.gid.data);
-                if participant != self.own {
-                    let mut state = lock(&self.state);
+                let mut state = lock(&self.state);
+                if participant != state.own {
                     self.mind_namesake(&mut state, participant, &info.node_entities_info_seq);
                     state.nodes.insert(participant, info.node_entities_info_seq);
                     drop(state);
@@ -181,21 +196,26 @@ impl Roster {
             return;
         }
         let Some(announced) = state.announced else { return };
-        let ours = other.0[..2] == self.own.0[..2];
-        if ours && other < self.own && announced.elapsed() < TOGETHER {
+        let ours = other.0[..2] == state.own.0[..2];
+        if ours && other < state.own && announced.elapsed() < TOGETHER {
             state.yields_to = Some(other);
         } else if !state.nodes.contains_key(&other) {
             self.notices.note(Trouble::Namesake, &name, || "it came later, and does not count".to_owned());
         }
     }
 
+    /// RustDDS was started anew.
+    pub(crate) fn note_renewal(&self, reason: &str) {
+        self.notices.note(Trouble::Renewed, &self.names.fully_qualified(), || reason.to_owned());
+    }
+
     /// Takes in who another process says that it is.
     pub(crate) fn note_identity(&self, sender: Gid, identity: Identity) {
         let process = sender.prefix();
-        if process == self.own.prefix() {
+        let mut state = lock(&self.state);
+        if process == state.own.prefix() {
             return;
         }
-        let mut state = lock(&self.state);
         state.members.note(process, identity);
         self.settle_all(&mut state);
         drop(state);
@@ -242,7 +262,7 @@ impl Roster {
             return;
         }
         let gid = Gid::from(reader.guid);
-        if !self.member || gid.prefix() == self.own.prefix() {
+        if !self.member || gid.prefix() == state.own.prefix() {
             return;
         }
         let described = Described { gid, topic: reader.topic_name, type_name: reader.type_name };
@@ -291,7 +311,7 @@ impl Roster {
         let revision = self.revision();
         let process = writer.prefix();
         let mut state = lock(&self.state);
-        if !self.member || process == self.own.prefix() {
+        if !self.member || process == state.own.prefix() {
             return (Standing::Counts, revision);
         }
         let announced: Vec<String> = state.nodes_of(process).map(fully_qualified).collect();
@@ -326,13 +346,6 @@ impl Roster {
         state.matched.get(&own).into_iter().flatten().copied().collect()
     }
 
-    /// Fully qualified names of the nodes that own the remote endpoints matched with ours.
-    pub(crate) fn matched_nodes(&self, own: Gid) -> BTreeSet<String> {
-        let state = lock(&self.state);
-        let matched = state.matched.get(&own);
-        matched.into_iter().flatten().filter_map(|gid| state.node_of(gid)).collect()
-    }
-
     /// Fully qualified names of all nodes of the other processes.
     pub(crate) fn nodes(&self) -> BTreeSet<String> {
         lock(&self.state).nodes.values().flatten().map(fully_qualified).collect()
@@ -354,8 +367,25 @@ impl Roster {
         lock(&self.state).yields_to.is_some()
     }
 
-    pub(crate) fn refusals(&self) -> Vec<String> {
-        lock(&self.state).refusals.iter().cloned().collect()
+    /// What is missing, in words, until these nodes (as the table names them) are matched on all topics that they have
+    /// in common with this one.
+    pub(crate) fn missing(&self, nodes: &[&str]) -> Vec<String> {
+        let state = lock(&self.state);
+        let there: BTreeSet<String> = state.nodes.values().flatten().map(fully_qualified).collect();
+        let namespace = self.names.namespace().trim_end_matches('/');
+        let mut missing = Vec::new();
+        for node in nodes {
+            let full = format!("{namespace}/{node}");
+            if there.contains(&full) {
+                missing.extend(state.unmatched(node, &full));
+            } else {
+                missing.push(format!("node {full} is not there"));
+            }
+        }
+        if !missing.is_empty() {
+            missing.extend(state.refusals.iter().cloned());
+        }
+        missing
     }
 
     /// Waits until the condition holds, and tells whether it does when the time is over.
@@ -376,6 +406,24 @@ impl Roster {
 }
 
 impl State {
+    fn new(own: Gid, members: Members) -> Self {
+        Self {
+            own,
+            announced: None,
+            readers: BTreeSet::new(),
+            writers: BTreeSet::new(),
+            table: Vec::new(),
+            nodes: BTreeMap::new(),
+            matched: BTreeMap::new(),
+            refusals: BTreeSet::new(),
+            members,
+            guests: Guests::default(),
+            strangers: BTreeMap::new(),
+            probed: false,
+            yields_to: None,
+        }
+    }
+
     fn match_up(&mut self, own: Gid, remote: Gid) {
         self.matched.entry(own).or_default().insert(remote);
     }
@@ -407,6 +455,23 @@ impl State {
         for matched in self.matched.values_mut() {
             matched.retain(|gid| !gid.0.starts_with(prefix));
         }
+    }
+
+    /// What a node that is there does not write or read yet.
+    fn unmatched(&self, node: &str, full: &str) -> Vec<String> {
+        let mut missing = Vec::new();
+        for (direction, gid, entry) in &self.table {
+            let (others, verb) = match direction {
+                Direction::Write => (entry.readers, "read"),
+                Direction::Read => (entry.writers, "write"),
+            };
+            let common = others.contains(&node) || (node == graph::RECORDER && *direction == Direction::Write);
+            let matched = self.matched.get(gid).into_iter().flatten();
+            if common && !matched.filter_map(|gid| self.node_of(gid)).any(|other| other == full) {
+                missing.push(format!("{full} does not {verb} {}", entry.name));
+            }
+        }
+        missing
     }
 
     fn refuse(&mut self, remote: Gid, what: &str) {

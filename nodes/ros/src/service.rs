@@ -12,7 +12,8 @@ use rustdds::{GUID, SampleIdentity, SequenceNumber};
 use serde::{Deserialize, Serialize};
 use swath_msgs::{RosMessage, RosService};
 
-use crate::endpoint::{Cdr, RawPublisher, RawSample, RawSubscription};
+use crate::cdr::Cdr;
+use crate::endpoint::{RawPublisher, RawSample, RawSubscription};
 use crate::error::RosError;
 use crate::message::{decode, decode_as, encode, encode_as};
 use crate::signal::Signal;

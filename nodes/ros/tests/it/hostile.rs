@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use swath_msgs::swath_msgs::{SpacecraftState, SubmitStripsRequest, SubmitStripsResponse};
+use swath_msgs::swath_msgs::{RequestSummary, SpacecraftState, SubmitStripsRequest, SubmitStripsResponse};
 use swath_ros::{Cdr, Node, Subscription, Trouble, encode, graph};
 
 use crate::common::{PATIENCE, Trial, eventually};
@@ -164,4 +164,37 @@ fn a_program_of_others_may_take_a_node_s_place_if_that_is_declared() {
     std::thread::sleep(Duration::from_millis(300));
     states.publish(&SpacecraftState { tick: 5, ..Default::default() }).unwrap();
     assert_eq!(received.wait(guidance.signal(), PATIENCE).unwrap().unwrap().tick, 5);
+}
+
+/// A panic in RustDDS ends its thread, not the process: without a sign of life it is started anew, and all goes on.
+#[test]
+fn a_node_whose_dds_has_died_starts_it_anew() {
+    let trial = Trial::new(20);
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
+    let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
+    let received = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
+    let summaries = spacecraft.publisher(&graph::REQUEST_SUMMARY).unwrap();
+    summaries.publish(&RequestSummary { tick: 9, ..Default::default() }).unwrap();
+    spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
+    let before = states.gid();
+    let stranger = Stranger::new(trial.domain, 7);
+    stranger.send_file("03_nackfrag_base0_56B.hex", false);
+    let mut renewed = 0;
+    eventually(|| {
+        spacecraft.check().unwrap();
+        let notices = spacecraft.notices().into_iter().chain(guidance.notices());
+        renewed += notices.filter(|notice| notice.trouble == Trouble::Renewed).count();
+        (renewed == 2).then_some(())
+    });
+    assert_ne!(states.gid(), before);
+    spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
+    for tick in 0..100 {
+        states.publish(&SpacecraftState { tick, ..Default::default() }).unwrap();
+        assert_eq!(received.wait(guidance.signal(), PATIENCE).unwrap().unwrap().tick, tick);
+    }
+    // What was latched is latched again.
+    let operator = trial.start(graph::OPERATOR, "").unwrap();
+    let latched = operator.subscription(&graph::REQUEST_SUMMARY).unwrap();
+    assert_eq!(latched.wait(operator.signal(), PATIENCE).unwrap().unwrap().tick, 9);
 }

@@ -6,4 +6,5 @@ mod guests;
 mod hostile;
 mod nodes;
 mod rosout;
+mod stopped;
 mod stranger;

@@ -94,6 +94,13 @@ impl Stranger {
         }
     }
 
+    /// Sends a datagram of the folder `rtps` as its own.
+    pub fn send_file(&self, name: &str, user: bool) {
+        let mut datagram = datagram(name);
+        datagram[8..20].copy_from_slice(&self.prefix);
+        self.send(&datagram, user);
+    }
+
     /// Waits for a datagram that contains these bytes.
     pub fn receive(&self, wanted: &[u8]) {
         let mut buffer = [0; 65536];
@@ -104,6 +111,14 @@ impl Stranger {
             }
         }
     }
+}
+
+/// A datagram of the folder `rtps` beside these tests.
+fn datagram(name: &str) -> Vec<u8> {
+    let path = format!("{}/tests/rtps/{name}", env!("CARGO_MANIFEST_DIR"));
+    let digits = std::fs::read_to_string(path).unwrap();
+    let digits = digits.trim().as_bytes();
+    digits.chunks(2).map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
 fn put(parameters: &mut Vec<u8>, id: u16, value: &[u8]) {
