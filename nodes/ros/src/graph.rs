@@ -44,6 +44,9 @@ pub const OPERATOR: &str = "operator";
 /// The nodes that fly a mission.
 pub const FLIGHT_NODES: [&str; 4] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER];
 
+/// The nodes that count only what other nodes of their mission say, and wait for nobody else.
+pub const MEMBERS: [&str; 5] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER, LAUNCHER];
+
 /// What the table says of a topic or service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {

@@ -33,36 +33,47 @@
 //! an asynchronous executor.
 
 mod background;
+mod cdr;
 mod cli;
 mod clock;
+mod dds;
 mod discovered;
 mod endpoint;
 mod environment;
 mod error;
 pub mod graph;
+mod guests;
+mod health;
 mod logging;
+mod members;
 mod message;
+mod minder;
 mod names;
 mod node;
+mod notices;
 mod param_services;
 mod params;
 pub mod qos;
 mod roster;
+mod rtps;
 mod service;
 mod shutdown;
 mod signal;
+mod slot;
 mod topic;
 mod value;
 
+pub use cdr::{Cdr, HEADER_LENGTH};
 pub use cli::RosArgs;
 pub use clock::{SimClock, stamp};
 pub use discovered::RemoteWriter;
-pub use endpoint::{Cdr, Gid, HEADER_LENGTH, RawPublisher, RawSample, RawSubscription, SampleInfo};
+pub use endpoint::{Gid, RawPublisher, RawSample, RawSubscription, SampleInfo};
 pub use environment::Environment;
 pub use error::RosError;
 pub use message::{decode, encode};
 pub use names::Names;
 pub use node::Node;
+pub use notices::{Notice, Trouble};
 pub use params::{Parameters, Spec};
 pub use service::{Client, Mapping, RequestId, Server};
 pub use shutdown::Shutdown;

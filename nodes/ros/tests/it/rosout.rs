@@ -1,11 +1,22 @@
-//! Log lines of a node on `/rosout`; alone in its process, for the first node of a process has its log.
+//! Log lines of a node on `/rosout`.
 
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use swath_ros::{Environment, Mapping, Node, RosArgs, graph};
 
+/// The first node of a process has its log, so this test has a process of its own.
 #[test]
 fn log_lines_reach_rosout() {
+    let words = ["--exact", "rosout::log_lines_reach_rosout_in_a_process_of_their_own", "--ignored", "--nocapture"];
+    let output = Command::new(std::env::current_exe().unwrap()).args(words).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("1 passed"));
+}
+
+#[test]
+#[ignore = "run by the test above"]
+fn log_lines_reach_rosout_in_a_process_of_their_own() {
     let process = std::process::id();
     let environment = Environment { domain: 10 + process as u16 % 20, localhost_only: true, mapping: Mapping::Cyclone };
     let words = format!("--ros-args -r __ns:=/p{process}");

@@ -1,5 +1,4 @@
 //! Nodes that meet over DDS: topics, late readers, services, parameters, names and what is missing.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::time::{Duration, Instant};
 
@@ -10,53 +9,9 @@ use swath_msgs::rcl_interfaces::{
 use swath_msgs::swath_msgs::{
     RequestSummary, SpacecraftState, StripRequest, SubmitResult, SubmitStripsRequest, SubmitStripsResponse, WheelTorque,
 };
-use swath_ros::{Environment, Mapping, Node, RosArgs, RosError, Spec, Value, decode, encode, graph};
+use swath_ros::{Mapping, RosError, Spec, Value, decode, encode, graph};
 
-const PATIENCE: Duration = Duration::from_secs(20);
-
-/// A domain and a namespace that one test has for itself, even while the same tests run elsewhere on this host.
-struct Trial {
-    domain: u16,
-    namespace: String,
-}
-
-impl Trial {
-    fn new(number: u16) -> Self {
-        let process = std::process::id();
-        // Domains 10 to 29: their ports lie below those that the system hands out.
-        let domain = 10 + (process as u16 % 20 + number) % 20;
-        Self { domain, namespace: format!("/p{process}") }
-    }
-
-    /// Starts a node on this host only, with words after `--ros-args`.
-    fn start(&self, name: &str, words: &str) -> Result<Node, RosError> {
-        self.start_mapped(name, words, Mapping::Cyclone)
-    }
-
-    fn start_mapped(&self, name: &str, words: &str, mapping: Mapping) -> Result<Node, RosError> {
-        let line = format!("--ros-args -r __ns:={} {words}", self.namespace);
-        let args = RosArgs::split(line.split_whitespace().map(str::to_owned))?.1;
-        let environment = Environment { domain: self.domain, localhost_only: true, mapping };
-        Node::start_in(environment, name, &args)
-    }
-
-    /// The name in this trial's namespace.
-    fn full(&self, name: &str) -> String {
-        format!("{}/{name}", self.namespace)
-    }
-}
-
-/// Tries until there is something or patience is over.
-fn eventually<T>(mut attempt: impl FnMut() -> Option<T>) -> T {
-    let deadline = Instant::now() + PATIENCE;
-    loop {
-        if let Some(found) = attempt() {
-            return found;
-        }
-        assert!(Instant::now() < deadline, "it did not happen in {PATIENCE:?}");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
+use crate::common::{PATIENCE, Trial, eventually};
 
 #[test]
 fn states_and_torques_go_both_ways_and_none_is_lost() {
@@ -200,7 +155,7 @@ fn parameters_are_read_and_set_from_outside() {
     let list = tool.client::<ListParameters>(&graph::Service::new("spacecraft/list_parameters", &[], &[])).unwrap();
     tool.wait_for_service(&list, PATIENCE).unwrap();
     let names = list.call(ListParametersRequest::default(), PATIENCE).unwrap().result.names;
-    assert_eq!(names, ["pace", "use_sim_time"]);
+    assert_eq!(names, ["epoch", "external", "fleet", "pace", "use_sim_time"]);
 
     let set = tool.client::<SetParameters>(&graph::Service::new("spacecraft/set_parameters", &[], &[])).unwrap();
     let get = tool.client::<GetParameters>(&graph::Service::new("spacecraft/get_parameters", &[], &[])).unwrap();
