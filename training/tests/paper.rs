@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use swath_sim::config::SimConfig;
-use swath_sim::scenario::ScenarioConfig;
+use swath_sim::requests::scenario::ScenarioConfig;
 use swath_training::config::{EnvironmentConfig, PpoConfig, RunConfig};
 use swath_training::environment::Environment;
 use swath_training::network::{Network, NetworkConfig};

@@ -1,6 +1,6 @@
 //! Times as people write them.
 
-use chrono::{DateTime, SecondsFormat};
+use chrono::{DateTime, SecondsFormat, Utc};
 
 /// Nanoseconds since 1970-01-01 UTC of a time such as `2026-01-01T06:00:00Z`.
 ///
@@ -19,9 +19,23 @@ pub fn format(ns: u64) -> String {
     DateTime::from_timestamp_nanos(ns).to_rfc3339_opts(SecondsFormat::AutoSi, true)
 }
 
+/// The time of a number of seconds since 1970-01-01 UTC, such as `2026-01-01 06:00:00`.
+#[must_use]
+pub fn date(seconds: u64) -> String {
+    let seconds = i64::try_from(seconds).unwrap_or(i64::MAX);
+    let time = DateTime::from_timestamp(seconds, 0).unwrap_or(DateTime::<Utc>::MAX_UTC);
+    time.format("%Y-%m-%d %H:%M:%S").to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dates() {
+        assert_eq!(date(0), "1970-01-01 00:00:00");
+        assert_eq!(date(1_709_210_096), "2024-02-29 12:34:56");
+    }
 
     #[test]
     fn times_round_trip_and_others_are_told() {

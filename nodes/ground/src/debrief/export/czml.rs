@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
-use swath_bags::date::date;
+use swath_mission::time_text::date;
 use swath_msgs::swath_msgs as msg;
 
 use super::Track;

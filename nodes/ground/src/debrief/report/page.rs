@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use swath_bags::date::date;
+use swath_mission::time_text::date;
 use swath_msgs::swath_msgs as msg;
 use swath_sim::task::Totals;
 use swath_sim::time::TickPeriod;
