@@ -12,9 +12,10 @@ pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pins")
 }
 
-/// The repository.
+/// The repository, wherever in it these pins lie.
 pub fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+    let mut above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    above.find(|folder| folder.join("Cargo.lock").is_file()).unwrap().to_owned()
 }
 
 /// Holds a text against the golden file of that name; `SWATH_BLESS=1` writes it anew.

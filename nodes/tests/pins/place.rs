@@ -98,7 +98,7 @@ impl Place {
         said.stdout
     }
 
-    /// A text without the names of folders and without times of the wall clock.
+    /// A text without the names of folders that differ from one machine to the next.
     fn lasting(&self, text: &str) -> String {
         let text = text.replace(self.folder.path().to_str().unwrap(), "<folder>");
         let text = text.replace(golden::folder().to_str().unwrap(), "<pins>");

@@ -70,6 +70,30 @@ fn tables() {
     golden::check("training/tables.txt", &text);
 }
 
+/// Figures of the shipped policies' learning curves and of a small evaluation.
+#[test]
+fn figures() {
+    let place = Place::new();
+    place.succeed(
+        "swath-train evaluate --planner heuristic:80 --planner lookahead --episodes 3 --orbits 0.3 --requests 700 \
+         --json evaluation.json",
+    );
+    let curve =
+        |label: &str, name: &str| format!("--curve {label}=<repository>/training/policies/{name}.progress.jsonl");
+    let line = format!(
+        "swath-train figures --out figures {} {} --evaluation fig4=evaluation.json --density evaluation.json",
+        curve("hop-ppo", "hop_ppo_scratch"),
+        curve("h-ppo", "h_ppo"),
+    );
+    place.succeed(&line);
+    let mut text = format!("$ {line}\n");
+    for name in ["fig3.svg", "fig4.svg", "fig5.svg"] {
+        let svg = place.read(&format!("figures/{name}"));
+        text += &format!("{name}: {} lines {}\n", svg.lines().count(), sha256(&svg));
+    }
+    golden::check("training/figures.txt", &text);
+}
+
 const RUN: &str = r#"name = "strips"
 steps = 96
 [environment]
