@@ -46,6 +46,7 @@ mod guests;
 mod health;
 mod logging;
 mod members;
+mod memory;
 mod message;
 mod minder;
 mod names;

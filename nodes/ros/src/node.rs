@@ -18,6 +18,7 @@ use crate::error::RosError;
 use crate::graph::{self, Entry};
 use crate::logging;
 use crate::members::{Identity, Members};
+use crate::memory;
 use crate::message::encode_as;
 use crate::minder::Minder;
 use crate::names::{Names, dds_service, dds_topic, dds_type};
@@ -39,6 +40,9 @@ const SETTLING: Duration = Duration::from_millis(300);
 
 const ANNOUNCEMENTS: &str = "ros_discovery_info";
 const ANNOUNCEMENT_TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
+
+/// Memory of a mission's node [10^6 B]: ten times what one needs.
+const MEMBER_MEMORY_MB: i64 = 1000;
 
 /// Where nodes of ours say who they are; no topic of the ROS graph.
 const IDENTITIES: &str = "swath_identity";
@@ -75,6 +79,8 @@ impl Node {
         let names = args.names(graph::NAMESPACE, name)?;
         let parameters = Parameters::new(args, &names);
         let (identity, members) = declare_identity(name, &names, &parameters)?;
+        let is_member = graph::MEMBERS.contains(&name);
+        declare_memory(is_member, &parameters)?;
         let dds = Arc::new(Dds::new(&environment)?);
         let participant = dds.participant();
         let minder = Arc::new(Minder::new(&participant)?);
@@ -82,7 +88,6 @@ impl Node {
         let latched = Profile::Latched.qos();
         let announcer = dds.writer(plan(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE, &latched)?)?;
         let own = Gid::from(participant.guid());
-        let is_member = graph::MEMBERS.contains(&name);
         let roster = Roster::new(own, names.clone(), announcer, Arc::clone(&minder), members, is_member);
         let roster = Arc::new(roster);
         let listen = |topic: &str, type_name: &str| -> Result<RawSubscription, RosError> {
@@ -340,6 +345,14 @@ fn declare_identity(name: &str, names: &Names, parameters: &Parameters) -> Resul
     let namespace = names.namespace().to_owned();
     let members = Members::new(&namespace, fleet.clone(), external);
     Ok((Identity { namespace, node: name.to_owned(), fleet, epoch }, members))
+}
+
+/// Declares the parameter that bounds the memory of this process, and bounds it.
+fn declare_memory(is_member: bool, parameters: &Parameters) -> Result<(), RosError> {
+    let text = "Memory that this process may have [10^6 B], 0 without bound; beyond it, it ends.";
+    let default = if is_member { MEMBER_MEMORY_MB } else { 0 };
+    let limit = Spec::new("memory_limit_mb", default, text).in_range(0.0..=1e9).read_only();
+    memory::bound(parameters.declare(limit)?.unsigned_abs())
 }
 
 fn plan(dds_topic: &str, type_name: &str, qos: &QosProfile) -> Result<Plan, RosError> {

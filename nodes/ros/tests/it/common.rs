@@ -28,7 +28,9 @@ impl Trial {
     }
 
     pub fn start_mapped(&self, name: &str, words: &str, mapping: Mapping) -> Result<Node, RosError> {
-        let line = format!("--ros-args -r __ns:={} {words}", self.namespace);
+        // Many nodes share the memory of this process.
+        let unbounded = if words.contains("memory_limit_mb") { "" } else { "-p memory_limit_mb:=0" };
+        let line = format!("--ros-args -r __ns:={} {unbounded} {words}", self.namespace);
         let args = RosArgs::split(line.split_whitespace().map(str::to_owned))?.1;
         let environment = Environment { domain: self.domain, localhost_only: true, mapping };
         Node::start_in(environment, name, &args)

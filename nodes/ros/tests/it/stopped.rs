@@ -1,5 +1,6 @@
 //! Nodes in processes of their own, which are stopped, or run out of memory.
 
+use std::os::unix::process::ExitStatusExt as _;
 use std::process::{Child, Command};
 use std::time::Duration;
 
@@ -7,6 +8,7 @@ use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
 use swath_ros::graph;
 
 use crate::common::{PATIENCE, Trial, eventually};
+use crate::stranger::Stranger;
 
 /// A test that is the body of a process of its own.
 struct Process(Child);
@@ -75,4 +77,29 @@ fn a_node_that_was_stopped_goes_on() {
     }
     eventually(&mut answered);
     eventually(&mut answered);
+}
+
+#[test]
+#[ignore = "the process of another test"]
+fn guidance_of_little_memory() {
+    let guidance = trial_of_parent().start(graph::GUIDANCE, "-p memory_limit_mb:=200").unwrap();
+    loop {
+        guidance.wait(PATIENCE).unwrap();
+    }
+}
+
+/// Two datagrams for which RustDDS wants gigabytes: one process ends, the machine lives.
+#[test]
+fn a_process_that_wants_too_much_memory_ends() {
+    const SIGABRT: i32 = 6;
+    for (number, file) in [(22, "04_heartbeat_long_range_52B.hex"), (23, "06_datafrag_4GiB_57B_any_prefix.hex")] {
+        let trial = Trial::new(number);
+        let watcher = trial.start(graph::PLANNER, "").unwrap();
+        let mut guidance = Process::start("stopped::guidance_of_little_memory", &trial);
+        eventually(|| watcher.nodes().contains(&trial.full("guidance")).then_some(()));
+        let stranger = Stranger::towards(guidance.0.id(), trial.domain, 8);
+        stranger.send_file(file, false);
+        let status = eventually(|| guidance.0.try_wait().unwrap());
+        assert_eq!(status.signal(), Some(SIGABRT), "{file}: {status}");
+    }
 }

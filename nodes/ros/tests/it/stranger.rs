@@ -1,4 +1,4 @@
-//! A program of others on the wire: a socket that sends hand-made RTPS datagrams to the nodes of this process.
+//! A program of others on the wire: a socket that sends hand-made RTPS datagrams to the nodes of one process.
 
 use std::collections::BTreeSet;
 use std::net::{Ipv4Addr, UdpSocket};
@@ -7,6 +7,7 @@ use std::time::Duration;
 /// A participant that announces what the test wants, and acknowledges nothing.
 pub struct Stranger {
     socket: UdpSocket,
+    process: u32,
     domain: u16,
     prefix: [u8; 12],
     announced_readers: u32,
@@ -18,10 +19,15 @@ const LITTLE_ENDIAN_WITH_DATA: u8 = 5;
 impl Stranger {
     /// A participant that all nodes of this process in the domain hear of.
     pub fn new(domain: u16, number: u8) -> Self {
+        Self::towards(std::process::id(), domain, number)
+    }
+
+    /// A participant that the nodes of another process in the domain hear of.
+    pub fn towards(process: u32, domain: u16, number: u8) -> Self {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         let prefix = [1, 0x12, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, number];
-        let stranger = Self { socket, domain, prefix, announced_readers: 0, announced_writers: 0 };
+        let stranger = Self { socket, process, domain, prefix, announced_readers: 0, announced_writers: 0 };
         let port = stranger.socket.local_addr().unwrap().port();
         let mut parameters = Vec::new();
         put(&mut parameters, 0x15, &[2, 3, 0, 0]);
@@ -87,9 +93,9 @@ impl Stranger {
         [&b"RTPS\x02\x03\x01\x12"[..], &self.prefix, &[0x15, LITTLE_ENDIAN_WITH_DATA], &length, &body].concat()
     }
 
-    /// Sends a datagram to every node of this process in the domain, to its user port or its discovery port.
+    /// Sends a datagram to every node of the process in the domain, to its user port or its discovery port.
     pub fn send(&self, datagram: &[u8], user: bool) {
-        for port in own_ports(self.domain).into_iter().filter(|port| (port % 2 == 1) == user) {
+        for port in ports(self.process, self.domain).into_iter().filter(|port| (port % 2 == 1) == user) {
             self.socket.send_to(datagram, (Ipv4Addr::LOCALHOST, port)).unwrap();
         }
     }
@@ -134,9 +140,9 @@ fn put_text(parameters: &mut Vec<u8>, id: u16, text: &str) {
     put(parameters, id, &value);
 }
 
-/// The unicast ports of RTPS in the domain that sockets of this process are bound to.
-fn own_ports(domain: u16) -> BTreeSet<u16> {
-    let fds = std::fs::read_dir("/proc/self/fd").unwrap().flatten();
+/// The unicast ports of RTPS in the domain that sockets of the process are bound to.
+fn ports(process: u32, domain: u16) -> BTreeSet<u16> {
+    let fds = std::fs::read_dir(format!("/proc/{process}/fd")).unwrap().flatten();
     let links = fds.filter_map(|fd| std::fs::read_link(fd.path()).ok()?.into_os_string().into_string().ok());
     let inodes: BTreeSet<String> =
         links.filter_map(|link| Some(link.strip_prefix("socket:[")?.strip_suffix(']')?.to_owned())).collect();
