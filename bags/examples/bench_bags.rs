@@ -16,9 +16,10 @@ use std::{
 use serde_json::{Value, json};
 use swath_bags::{
     Bag, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
-    play::{PlayOptions, Player},
+    play::{End, LAST_MESSAGES, PlayOptions, Player},
     qos::QosProfile,
     record::{RecordOptions, Recorder},
+    tap::Selection,
 };
 use swath_msgs::Interface;
 use swath_ros::{
@@ -75,10 +76,12 @@ fn measure() -> Value {
     let zstd_dir = temp.path().join("zstd");
     let zstd = write(&zstd_dir, Compression::Zstd, &messages, 1_000_000, 1);
     let read = read(&zstd_dir);
+    let many = many_topics(&temp.path().join("many"));
     let mut result = record_over_dds(&temp.path().join("recorded"));
     result["bag_write_MB_per_s"] = json!(none.round());
     result["bag_write_zstd_MB_per_s"] = json!(zstd.round());
     result["bag_read_msgs_per_s"] = json!(read.round());
+    result["bag_60000_topics_s"] = json!(many);
     if let (Value::Object(all), Value::Object(played)) = (&mut result, measure_playing(temp.path(), &messages)) {
         all.extend(played);
     }
@@ -128,6 +131,24 @@ fn read(dir: &Path) -> f64 {
     n / start.elapsed().as_secs_f64()
 }
 
+/// A message of one of 60 000 topics, from the opening of the bag on [s].
+fn many_topics(dir: &Path) -> f64 {
+    let bag = BagWriter::create(dir, BagOptions::default()).unwrap();
+    for n in 0..60_000u64 {
+        let topic =
+            Topic::new(&format!("/t{n}"), "std_msgs/msg/UInt64", "uint64 data\n", "", vec![QosProfile::reliable(1)]);
+        let topic = bag.add_topic(&topic.unwrap()).unwrap();
+        bag.write(topic, n, n, &message(n)).unwrap();
+    }
+    bag.close().unwrap();
+    let start = Instant::now();
+    let bag = Bag::open(dir).unwrap();
+    let topics = TopicPattern::new(&["/t30000".to_owned()], None, None).unwrap();
+    let mut messages = bag.messages(&Filter { topics, ..Filter::default() }).unwrap();
+    assert_eq!(messages.next().unwrap().unwrap().log_time, 30_000);
+    start.elapsed().as_secs_f64()
+}
+
 /// A publisher and a recorder, each in its process.
 fn record_over_dds(dir: &Path) -> Value {
     let role = |args: &[&str]| {
@@ -170,9 +191,11 @@ fn record(dir: &Path) -> Value {
     let names = [TOPIC.to_owned()];
     let options = RecordOptions {
         output: dir.to_owned(),
-        topics: TopicPattern::new(&names, None, None).unwrap(),
-        discover: true,
-        depth: 16_384,
+        selection: Selection {
+            topics: TopicPattern::new(&names, None, None).unwrap(),
+            depth: 16_384,
+            ..Selection::default()
+        },
         ..RecordOptions::default()
     };
     let recorder = Recorder::start(options, &RosArgs::default()).unwrap();
@@ -231,13 +254,14 @@ fn play(bag: &Path, rate: f64) -> Value {
         rate,
         repeat: false,
         start_offset: 0,
-        end_offset: None,
+        end: End::default(),
         delay: Duration::from_secs(2),
         paused: false,
         clock_hz: None,
         remap: BTreeMap::new(),
         qos_overrides: BTreeMap::new(),
         keys: false,
+        acknowledged: Some(LAST_MESSAGES),
     };
     let player = Player::start(options, &RosArgs::default()).unwrap();
     let summary = player.run(&Shutdown::default(), |_| ()).unwrap();

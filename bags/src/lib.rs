@@ -9,11 +9,13 @@ mod file;
 pub mod metadata;
 pub mod ops;
 pub mod play;
+mod preset;
 pub mod qos;
 mod reader;
 pub mod record;
 mod ros_qos;
 pub mod schema;
+pub mod tap;
 mod topic;
 mod writer;
 

@@ -46,7 +46,7 @@ pub struct TopicMetadata {
     #[serde(default, deserialize_with = "profiles")]
     pub offered_qos_profiles: Vec<QosProfile>,
     /// `RIHS01_…`, or empty; since version 7.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub type_description_hash: String,
 }
 
@@ -88,21 +88,21 @@ pub struct BagInformation {
     /// Topics with counts.
     pub topics_with_message_count: Vec<TopicCount>,
     /// `zstd` where messages or whole files are compressed; since version 3.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub compression_format: String,
     /// `MESSAGE`, `FILE`, or empty: chunks are compressed by MCAP itself.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub compression_mode: String,
     /// Files in order of time.
     pub relative_file_paths: Vec<String>,
     /// The same files with their times and counts; since version 5.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub files: Vec<FileInformation>,
     /// Free text pairs; since version 6.
     #[serde(default, deserialize_with = "texts")]
     pub custom_data: Option<BTreeMap<String, String>>,
     /// ROS distribution that recorded the bag; since version 8.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "or_default")]
     pub ros_distro: String,
 }
 
@@ -177,6 +177,11 @@ fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Er
     }
 }
 
+/// A value, or nothing, which YAML writes `~`.
+fn or_default<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserializer: D) -> Result<T, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or_default())
+}
+
 /// QoS profiles as a list or as the text of one; what is wrong with them is the topic's fault, not the bag's.
 fn profiles<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<QosProfile>, D::Error> {
     Ok(match Value::deserialize(deserializer)? {
@@ -239,7 +244,8 @@ mod tests {
         assert_eq!(iron.ros_distro, "iron");
         let custom_data = iron.custom_data.unwrap();
         assert_eq!((custom_data["vehicle"].as_str(), custom_data["number"].as_str()), ("sat-7", "7"));
-        assert_eq!(read(9, "", "  custom_data: ~\n").unwrap().custom_data, None);
+        let nothing = read(9, ", type_description_hash: ~", "  custom_data: ~\n  files: ~\n  ros_distro: ~\n").unwrap();
+        assert_eq!((nothing.custom_data, nothing.ros_distro.as_str()), (None, ""));
     }
 
     #[test]

@@ -113,6 +113,13 @@ impl Topic {
         self.metadata.get(QOS).map(|text| qos::from_yaml(text))
     }
 
+    /// Changes what the publishers are said to have offered.
+    pub(crate) fn set_qos(&mut self, qos: Vec<QosProfile>) -> Result<()> {
+        self.metadata.insert(QOS.to_owned(), qos::to_yaml(&qos)?);
+        self.qos = qos;
+        Ok(())
+    }
+
     /// The topic as a new bag holds it: its QoS profiles in words.
     pub(crate) fn in_words(&self) -> Self {
         let mut topic = self.clone();

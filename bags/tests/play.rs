@@ -11,18 +11,19 @@ use std::{
 };
 
 use common::{
-    TICK,
+    TICK, cdr,
     program::{PATIENCE, Program, call, client, node, wait_until},
-    stamp, write_sample,
+    stamp, state, write_sample,
 };
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use swath_bags::{Bag, BagOptions, Filter};
+use swath_bags::{Bag, BagOptions, BagWriter, Filter, qos::QosProfile as BagQos};
 use swath_msgs::{
     rosbag2_interfaces::{
         Burst, BurstRequest, GetRate, IsPaused, PlayNext, Resume, Seek, SeekRequest, SetRate, SetRateRequest, Stop,
         TogglePaused,
     },
     rosgraph_msgs::Clock,
+    swath_msgs::SpacecraftState,
 };
 use swath_ros::{
     Node, RawSample, RawSubscription, Subscription, graph,
@@ -273,6 +274,96 @@ fn keys_pause_and_step() {
     let (status, done) = player.end();
     assert!(status.success());
     assert_eq!(done.unwrap()["messages"], TICKS);
+}
+
+/// A bag whose second message comes a year after its first.
+fn stretched(dir: &Path) {
+    let bag = BagWriter::create(&dir.join("bag"), BagOptions::default()).unwrap();
+    let states = bag.add_topic(&common::topic::<SpacecraftState>(STATES, BagQos::reliable(10))).unwrap();
+    for (tick, time) in [(0, 0), (1, 31_536_000_000_000_000)] {
+        bag.write(states, time, time, &cdr(&state(tick))).unwrap();
+    }
+    bag.close().unwrap();
+}
+
+#[test]
+fn a_signal_ends_the_player_while_it_sleeps() {
+    let temp = tempfile::tempdir().unwrap();
+    stretched(temp.path());
+    for (domain, signal) in [(40, "-INT"), (41, "-TERM")] {
+        let node = node(domain);
+        let player = player(domain, temp.path(), &["--delay", "3"]);
+        let states = states(&node, STATES);
+        assert_eq!(ticks(&take(&states, 1)), [0]);
+        let (status, done) = player.signalled(&[signal]);
+        assert!(status.success(), "{signal}: {status}");
+        assert_eq!(done.unwrap()["messages"], 1);
+    }
+}
+
+#[test]
+fn big_endian_messages_are_turned_over_and_what_cannot_be_sent_is_told() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let node = node(42);
+    let player = Program::start(42, &data, &["play", "encapsulations.mcap", "-r", "0", "-p"]);
+    let texts = reliable(&node, "/chatter", "std_msgs/msg/String");
+    wait_until("the player is heard", || texts.matched() > 0);
+    call(&client::<Resume>(&node, "/swath/player/resume"));
+    let played = take(&texts, 5);
+    let text = |sample: &RawSample| {
+        let bytes = sample.cdr.as_bytes();
+        assert_eq!(bytes[..2], [0, 1]);
+        let len = u32::from_le_bytes(*bytes[4..].first_chunk().unwrap()) as usize;
+        String::from_utf8(bytes[8..8 + len - 1].to_vec()).unwrap()
+    };
+    assert_eq!(played.iter().map(text).collect::<Vec<_>>(), ["be", "le", "xcdr2_le", "xcdr2_be", "pad"]);
+    let (status, done) = player.end();
+    let done = done.unwrap();
+    assert_eq!((status.code(), &done["messages"], &done["refused"]), (Some(3), &5.into(), &2.into()));
+}
+
+#[test]
+fn odd_names_are_played_in_full() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let node = node(43);
+    let player = Program::start(43, &data, &["play", "-i", "odd_names.mcap", "mcap", "-r", "0", "-p"]);
+    let texts = reliable(&node, "/short_type", "std_msgs/msg/String");
+    wait_until("the player is heard", || texts.matched() > 0);
+    call(&client::<Resume>(&node, "/swath/player/resume"));
+    assert_eq!(take(&texts, 1).len(), 1);
+    player.end();
+}
+
+#[test]
+fn the_options_of_ros2_bag_play() {
+    let temp = folder();
+    let run = |words: &[&str]| {
+        let program = player(44, temp.path(), &[&["-r", "0", "--delay", "0"], words].concat());
+        let (status, done) = program.end();
+        assert!(status.success(), "{words:?}");
+        done.unwrap()["messages"].as_u64().unwrap()
+    };
+    assert_eq!(run(&["--playback-duration", "0"]), 0);
+    assert_eq!(run(&["--playback-until-sec", "10", "--topics", STATES]), 21);
+    assert_eq!(run(&["--playback-until-nsec", "500000000", "--exclude-topics", "/clock", "/swath/strips/.*"]), 2);
+    assert_eq!(run(&["--exclude-regex", ".*/state", "--wait-for-all-acked", "100", "-s", "mcap"]), TICKS + 1);
+}
+
+#[test]
+fn a_damaged_file_is_passed_over_and_told() {
+    let temp = tempfile::tempdir().unwrap();
+    let options = BagOptions { max_file_bytes: Some(6_000), chunk_bytes: 4096, ..BagOptions::default() };
+    write_sample(&temp.path().join("bag"), TICKS, options);
+    let path = temp.path().join("bag/bag_1.mcap");
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let left = Bag::open(&temp.path().join("bag")).unwrap().message_count();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+    command.current_dir(temp.path()).env("ROS_DOMAIN_ID", "45").args(["play", "bag", "-r", "0", "--delay", "0"]);
+    let output = command.output().unwrap();
+    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(3), "{stderr}");
+    assert!(stderr.contains("bag_1.mcap") && stdout.contains(&format!("\"messages\":{left}")), "{stdout}{stderr}");
 }
 
 #[test]

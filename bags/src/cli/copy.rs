@@ -73,10 +73,10 @@ pub(super) fn seconds(text: &str) -> Result<u64, String> {
 pub struct Shape {
     /// Compression of chunks: zstd, lz4 or none
     #[arg(long, default_value = "zstd")]
-    compression: Compression,
+    pub(super) compression: Compression,
     /// Level of zstd, 1 (fast) to 19 (small)
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(i32).range(1..=19))]
-    compression_level: i32,
+    pub(super) compression_level: i32,
     /// Size of chunks before compression [bytes]
     #[arg(long, default_value_t = 1 << 20, value_parser = clap::value_parser!(u64).range(1024..=64 << 20))]
     chunk_size: u64,

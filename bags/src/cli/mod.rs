@@ -1,12 +1,17 @@
 //! The command line of `swath-bag`: arguments, and what each command prints.
 
+mod convert;
 mod copy;
 mod inspect;
 mod play;
 mod record;
+mod signals;
 
 use std::{
+    collections::BTreeMap,
+    fs,
     io::{self, Write},
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
@@ -17,6 +22,7 @@ use swath_ros::RosArgs;
 use crate::{
     error::{BagError, Result},
     file::source::{MAX_RECORD_BYTES, ReadOptions},
+    qos::QosOverride,
 };
 
 /// The exit code of a command that has done its work, with loss.
@@ -33,12 +39,37 @@ struct ReadArgs {
         value_parser = clap::value_parser!(u64).range(1024..=u64::from(u32::MAX))
     )]
     max_record_size: u64,
+    /// Kind of files, for scripts that name it; it is seen from the files themselves
+    #[arg(short, long, value_name = "KIND", value_parser = ["mcap", "sqlite3"])]
+    storage: Option<String>,
 }
 
 impl ReadArgs {
     fn options(&self) -> ReadOptions {
         ReadOptions { max_record_bytes: self.max_record_size }
     }
+}
+
+/// The bags of `--input BAG [KIND]`, which stands as often as there are bags: kinds are seen from the files.
+fn bags(words: Vec<String>) -> Vec<PathBuf> {
+    let mut bags: Vec<PathBuf> = Vec::new();
+    for word in words {
+        let is_kind = matches!(word.as_str(), "mcap" | "sqlite3") && !bags.is_empty() && !Path::new(&word).exists();
+        if !is_kind {
+            bags.push(word.into());
+        }
+    }
+    bags
+}
+
+/// QoS by topic, from a YAML file.
+fn overrides(path: Option<&Path>) -> Result<BTreeMap<String, QosOverride>> {
+    let Some(path) = path else { return Ok(BTreeMap::new()) };
+    let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
+    yaml_serde::from_str(&text).map_err(|e| BagError::Option {
+        option: "--qos-profile-overrides-path",
+        reason: format!("{}: {e}", path.display()),
+    })
 }
 
 /// The exit code of a command that has done its work; tells what was lost on the way.
@@ -68,6 +99,10 @@ pub enum Command {
     Merge(copy::MergeArgs),
     /// Save what is whole in a bag that is damaged or was not closed
     Recover(copy::RecoverArgs),
+    /// Write a bag's metadata.yaml anew, from its files
+    Reindex(convert::ReindexArgs),
+    /// Write bags anew with other settings, as a file of rosbag2's output options says
+    Convert(convert::ConvertArgs),
 }
 
 impl Command {
@@ -88,6 +123,8 @@ impl Command {
             Self::Filter(args) => args.run(),
             Self::Merge(args) => args.run(),
             Self::Recover(args) => args.run(),
+            Self::Reindex(args) => args.run(),
+            Self::Convert(args) => args.run(),
         };
         match result {
             // The reader of our output has seen enough, as `head` does.

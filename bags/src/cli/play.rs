@@ -1,22 +1,15 @@
 //! `play`: a bag's messages onto a ROS 2 domain.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-    process::ExitCode,
-    time::Duration,
-};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use serde_json::json;
-use swath_ros::{RosArgs, Shutdown};
+use swath_ros::RosArgs;
 
-use super::{ReadArgs, copy::seconds, print_json};
+use super::{ReadArgs, WITH_LOSS, bags, copy::seconds, done, overrides, print_json, signals::shutdown_on_signals};
 use crate::{
-    error::{BagError, Result, chain},
-    play::{PlayOptions, Player},
-    qos::QosOverride,
+    error::{Result, chain},
+    play::{End, LAST_MESSAGES, PlayOptions, Player},
     reader::TopicPattern,
 };
 
@@ -31,8 +24,11 @@ Services: ~/pause, ~/resume, ~/toggle_paused, ~/is_paused, ~/get_rate, ~/set_rat
 Prints {\"event\":\"ready\",…} when every publisher exists, and {\"event\":\"done\",…} at the end.")]
 pub struct PlayArgs {
     /// Bag directories or .mcap files, played as one bag
-    #[arg(required = true)]
+    #[arg(required_unless_present = "input", value_name = "BAG")]
     bags: Vec<PathBuf>,
+    /// Another bag, and the kind of its files if you like
+    #[arg(short, long, num_args = 1..=2, value_names = ["BAG", "KIND"])]
+    input: Vec<String>,
     /// Speed: log time over wall time; 0 is as fast as it goes
     #[arg(short, long, default_value_t = 1.0, value_parser = rate)]
     rate: f64,
@@ -48,6 +44,12 @@ pub struct PlayArgs {
     /// Play until so long after the bag's start [s]
     #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "playback_duration")]
     until: Option<u64>,
+    /// Play until a log time [s]; with --playback-duration, until the later of both
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "until")]
+    playback_until_sec: Option<u64>,
+    /// Play until a log time [ns]
+    #[arg(long, value_name = "NANOSECONDS", conflicts_with_all = ["until", "playback_until_sec"])]
+    playback_until_nsec: Option<u64>,
     /// Wait before the first message, so that readers are found [s]
     #[arg(short, long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
     delay: u64,
@@ -64,14 +66,20 @@ pub struct PlayArgs {
     #[arg(short = 'e', long)]
     regex: Option<String>,
     /// Topics to leave out, by a regular expression for the whole name
-    #[arg(short = 'x', long)]
+    #[arg(short = 'x', long, visible_alias = "exclude-regex")]
     exclude: Option<String>,
+    /// Topics to leave out: names, or regular expressions for whole names
+    #[arg(long, value_name = "TOPIC", num_args = 1..)]
+    exclude_topics: Vec<String>,
     /// Play a topic under another name
     #[arg(short = 'm', long, value_name = "OLD:=NEW", num_args = 1.., value_parser = renaming)]
     remap: Vec<(String, String)>,
     /// YAML file: by topic, what differs from the recorded QoS
     #[arg(long, value_name = "FILE")]
     qos_profile_overrides_path: Option<PathBuf>,
+    /// At the end, wait until every reliable reader has everything, so long at most [ms]; 0 waits without end
+    #[arg(long, value_name = "MILLISECONDS")]
+    wait_for_all_acked: Option<u64>,
     /// Leave the terminal's keys alone
     #[arg(long)]
     disable_keyboard_controls: bool,
@@ -82,7 +90,7 @@ pub struct PlayArgs {
 impl PlayArgs {
     pub(super) fn run(self, ros: &RosArgs) -> Result<ExitCode> {
         let player = Player::start(self.options()?, ros)?;
-        let shutdown = Shutdown::on_signals(player.signal())?;
+        let shutdown = shutdown_on_signals(player.signal())?;
         let summary = player.run(&shutdown, |topics| {
             if let Err(error) = print_json(&json!({ "event": "ready", "topics": topics })) {
                 tracing::warn!("{}", chain(&error));
@@ -95,29 +103,35 @@ impl PlayArgs {
             "wall_seconds": summary.wall.as_secs_f64(),
             "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3,
         }))?;
-        Ok(if summary.refused == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+        if summary.refused > 0 {
+            eprintln!("{} messages could not be published", summary.refused);
+        }
+        let code = done(&summary.faults);
+        Ok(if summary.refused == 0 { code } else { ExitCode::from(WITH_LOSS) })
     }
 
     fn options(self) -> Result<PlayOptions> {
-        let qos_overrides = match &self.qos_profile_overrides_path {
-            Some(path) => overrides(path)?,
-            None => BTreeMap::new(),
-        };
-        let duration_end = self.playback_duration.map(|d| self.start_offset.saturating_add(d));
+        let until = self.playback_until_nsec.or(self.playback_until_sec);
+        let topics = TopicPattern::new(&self.topics, self.regex.as_deref(), self.exclude.as_deref())?;
         Ok(PlayOptions {
-            bags: self.bags,
+            bags: self.bags.into_iter().chain(bags(self.input)).collect(),
             read: self.read.options(),
-            topics: TopicPattern::new(&self.topics, self.regex.as_deref(), self.exclude.as_deref())?,
+            topics: topics.without(&self.exclude_topics)?,
             rate: self.rate,
             repeat: self.repeat,
             start_offset: self.start_offset,
-            end_offset: self.until.or(duration_end),
+            end: End { offset: self.until, duration: self.playback_duration, time: until },
             delay: Duration::from_nanos(self.delay),
             paused: self.start_paused,
             clock_hz: self.clock,
             remap: self.remap.into_iter().collect(),
-            qos_overrides,
+            qos_overrides: overrides(self.qos_profile_overrides_path.as_deref())?,
             keys: !self.disable_keyboard_controls,
+            acknowledged: match self.wait_for_all_acked {
+                None => Some(LAST_MESSAGES),
+                Some(0) => None,
+                Some(milliseconds) => Some(Duration::from_millis(milliseconds)),
+            },
         })
     }
 }
@@ -141,12 +155,4 @@ fn in_range(text: &str, least: f64, greatest: f64) -> Result<f64, String> {
 fn renaming(text: &str) -> Result<(String, String), String> {
     let (old, new) = text.split_once(":=").ok_or_else(|| format!("{text:?} is not OLD:=NEW"))?;
     Ok((old.to_owned(), new.to_owned()))
-}
-
-fn overrides(path: &Path) -> Result<BTreeMap<String, QosOverride>> {
-    let text = fs::read_to_string(path).map_err(BagError::io("read", path))?;
-    yaml_serde::from_str(&text).map_err(|e| BagError::Option {
-        option: "--qos-profile-overrides-path",
-        reason: format!("{}: {e}", path.display()),
-    })
 }

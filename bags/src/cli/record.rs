@@ -11,13 +11,16 @@ use std::{
 use chrono::DateTime;
 use clap::Args;
 use serde_json::{Value, json};
-use swath_ros::{RosArgs, Shutdown};
+use swath_ros::RosArgs;
 
-use super::{copy::Shape, print_json};
+use super::{WITH_LOSS, copy::Shape, overrides, print_json, signals::shutdown_on_signals};
 use crate::{
     error::{BagError, Result},
+    file::chunk::Compression,
+    preset::Preset,
     reader::TopicPattern,
-    record::{RecordClock, RecordOptions, Recorder},
+    record::{RecordOptions, Recorder},
+    tap::{Discovery, Selection, TapClock},
     writer::BagOptions,
 };
 
@@ -32,12 +35,20 @@ pub const MANIFEST_TEXT: &str = "manifest";
   swath-bag record -o out/bag --exclude '/rosout|/parameter_events' --max-bag-duration 5400
 
 Prints {\"event\":\"ready\",…} when every subscription exists, and {\"event\":\"closed\",…} at the end.
-Ctrl-C or SIGTERM closes the bag. Exits with 1 when messages were lost or could not be stored.
+Ctrl-C or SIGTERM closes the bag, which another signal does not disturb. Exits with 3 when messages were lost, with 1
+when they could not be stored.
 Services: ~/pause, ~/resume, ~/toggle_paused, ~/is_paused, ~/split_bagfile, ~/snapshot, ~/stop.
 Words after --ros-args are those of every ROS 2 program.")]
 pub struct RecordArgs {
-    /// Topics to record; all without this and --regex
+    /// Topics to record; all without this, --topics and --regex
+    #[arg(value_name = "TOPIC")]
+    named: Vec<String>,
+    /// Topics to record
+    #[arg(long, value_name = "TOPIC", num_args = 1..)]
     topics: Vec<String>,
+    /// Record all topics, which is what happens without any named
+    #[arg(short, long, visible_alias = "all-topics", conflicts_with_all = ["named", "topics", "regex"])]
+    all: bool,
     /// Directory of the new bag; by default named after the time
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -45,8 +56,17 @@ pub struct RecordArgs {
     #[arg(short = 'e', long)]
     regex: Option<String>,
     /// Topics to leave out, by a regular expression for the whole name
-    #[arg(short = 'x', long)]
+    #[arg(short = 'x', long, visible_alias = "exclude-regex")]
     exclude: Option<String>,
+    /// Topics to leave out: names, or regular expressions for whole names
+    #[arg(long, value_name = "TOPIC", num_args = 1..)]
+    exclude_topics: Vec<String>,
+    /// Record hidden topics, too, which have a name with a part that begins with _
+    #[arg(long)]
+    include_hidden_topics: bool,
+    /// Record only topics that are there at the start
+    #[arg(long, conflicts_with = "graph_only")]
+    no_discovery: bool,
     /// Record only topics of Swath's node graph, do not look for others
     #[arg(long)]
     graph_only: bool,
@@ -59,9 +79,24 @@ pub struct RecordArgs {
     /// Messages that a subscription keeps while they wait to be stored
     #[arg(long, default_value_t = 16_384, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     depth: u64,
+    /// YAML file: by topic, what differs from the QoS with which it would be read
+    #[arg(long, value_name = "FILE")]
+    qos_profile_overrides_path: Option<PathBuf>,
     /// Start paused
     #[arg(long)]
     start_paused: bool,
+    /// Kind of files: mcap is the only one that is written
+    #[arg(short, long, default_value = "mcap", value_parser = ["mcap"])]
+    storage: String,
+    /// What ros2 bag compresses: with file or message, chunks are compressed here, which every reader of MCAP reads
+    #[arg(long, default_value = "none", value_parser = ["none", "file", "message"])]
+    compression_mode: String,
+    /// With which format: zstd or lz4
+    #[arg(long, value_name = "FORMAT", value_parser = format)]
+    compression_format: Option<Compression>,
+    /// One of the presets of rosbag2's MCAP storage, in place of --compression and its level
+    #[arg(long, value_name = "PRESET", conflicts_with_all = ["compression", "compression_level"])]
+    storage_preset_profile: Option<Preset>,
     /// Keep messages in memory and store them when ~/snapshot is called
     #[arg(long)]
     snapshot_mode: bool,
@@ -87,7 +122,7 @@ pub struct RecordArgs {
 impl RecordArgs {
     pub(super) fn run(self, ros: &RosArgs) -> Result<ExitCode> {
         let recorder = Recorder::start(self.options()?, ros)?;
-        let shutdown = Shutdown::on_signals(recorder.signal())?;
+        let shutdown = shutdown_on_signals(recorder.signal())?;
         let summary = recorder.run(&shutdown, |topics| {
             // The launcher waits for this line; without it, it gives up by itself.
             if let Err(error) = print_json(&json!({ "event": "ready", "topics": topics })) {
@@ -100,12 +135,14 @@ impl RecordArgs {
         }))?;
         if summary.lost > 0 {
             eprintln!("{} messages were lost", summary.lost);
-            return Ok(ExitCode::FAILURE);
+            return Ok(ExitCode::from(WITH_LOSS));
         }
         Ok(ExitCode::SUCCESS)
     }
 
     fn options(self) -> Result<RecordOptions> {
+        let shape = self.bag_options()?;
+        let selection = self.selection()?;
         let metadata = match &self.manifest {
             Some(path) => {
                 let mut entries = manifest(path)?;
@@ -114,26 +151,60 @@ impl RecordArgs {
             }
             None => Vec::new(),
         };
-        let topics: Vec<String> = self.topics.iter().map(|t| format!("/{}", t.trim_start_matches('/'))).collect();
         Ok(RecordOptions {
             output: self.output.unwrap_or_else(default_output),
             bag: BagOptions {
                 snapshot_bytes: self.snapshot_mode.then_some(self.max_cache_size as usize),
                 custom_data: self.custom_data.into_iter().collect(),
-                ..self.shape.options()
+                ..shape
             },
-            topics: TopicPattern::new(&topics, self.regex.as_deref(), self.exclude.as_deref())?,
-            discover: !self.graph_only,
-            clock: match (self.wall_time, self.use_sim_time) {
-                (true, _) => RecordClock::Wall,
-                (false, true) => RecordClock::SimulatedLater,
-                (false, false) => RecordClock::Simulated,
-            },
-            depth: self.depth as usize,
+            selection,
             metadata,
             paused: self.start_paused,
-            expected_nodes: self.expect,
         })
+    }
+
+    fn selection(&self) -> Result<Selection> {
+        let names = self.named.iter().chain(&self.topics);
+        let names: Vec<String> = names.map(|topic| format!("/{}", topic.trim_start_matches('/'))).collect();
+        let topics = TopicPattern::new(&names, self.regex.as_deref(), self.exclude.as_deref())?;
+        Ok(Selection {
+            topics: topics.without(&self.exclude_topics)?,
+            discovery: match (self.graph_only, self.no_discovery) {
+                (true, _) => Discovery::Never,
+                (false, true) => Discovery::AtStart,
+                (false, false) => Discovery::Always,
+            },
+            hidden: self.include_hidden_topics,
+            clock: match (self.wall_time, self.use_sim_time) {
+                (true, _) => TapClock::Wall,
+                (false, true) => TapClock::SimulatedLater,
+                (false, false) => TapClock::Simulated,
+            },
+            depth: self.depth as usize,
+            qos_overrides: overrides(self.qos_profile_overrides_path.as_deref())?,
+            expected_nodes: self.expect.clone(),
+        })
+    }
+
+    fn bag_options(&self) -> Result<BagOptions> {
+        let mut options = self.shape.options();
+        if let Some(preset) = self.storage_preset_profile {
+            preset.apply(&mut options);
+        }
+        match (self.compression_mode.as_str(), self.compression_format) {
+            ("none", Some(_)) => {
+                let reason = "takes --compression-mode file or message".to_owned();
+                Err(BagError::Option { option: "--compression-format", reason })
+            }
+            ("none", None) => Ok(options),
+            (mode, format) => {
+                options.compression = format.unwrap_or_default();
+                let name = options.compression.mcap_name();
+                eprintln!("--compression-mode {mode}: chunks are compressed with {name}, not each {mode}");
+                Ok(options)
+            }
+        }
     }
 }
 
@@ -141,6 +212,15 @@ fn default_output() -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let now = DateTime::from_timestamp(now.as_secs().cast_signed(), 0).unwrap_or_default();
     now.format("rosbag2_%Y_%m_%d-%H_%M_%S").to_string().into()
+}
+
+/// A compression by its name; none is no format.
+fn format(text: &str) -> Result<Compression, String> {
+    match text {
+        "zstd" => Ok(Compression::Zstd),
+        "lz4" => Ok(Compression::Lz4),
+        other => Err(format!("{other:?} is neither zstd nor lz4")),
+    }
 }
 
 fn pair(text: &str) -> Result<(String, String), String> {

@@ -285,9 +285,13 @@ impl FileIndex {
         source.read_at(place.body(), &mut body[..len])?;
         let (message, _) = record::message(&body[..len]).map_err(|reason| source.corrupt(place.offset, reason))?;
         *self.counts.entry(message.channel_id).or_insert(0) += 1;
-        let time = message.log_time;
+        let (time, whole) = (message.log_time, place.end() - place.offset);
         match self.chunks.last_mut() {
-            Some(run) if run.kind == Kind::Loose && run.offset + run.len == place.offset && run.len < LOOSE_BYTES => {
+            Some(run)
+                if run.kind == Kind::Loose
+                    && run.offset + run.len == place.offset
+                    && run.len + whole <= LOOSE_BYTES =>
+            {
                 run.len = place.end() - run.offset;
                 (run.start, run.end) = (run.start.min(time), run.end.max(time));
                 if let Some(channels) = run.channels.as_mut().filter(|ids| !ids.contains(&message.channel_id)) {
@@ -295,7 +299,7 @@ impl FileIndex {
                 }
             }
             _ => {
-                let (offset, len) = (place.offset, place.end() - place.offset);
+                let (offset, len) = (place.offset, whole);
                 let channels = Some(vec![message.channel_id]);
                 self.chunks.push(ChunkRef { offset, len, start: time, end: time, kind: Kind::Loose, channels });
             }

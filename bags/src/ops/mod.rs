@@ -2,9 +2,11 @@
 
 pub mod cat;
 mod checks;
+pub mod convert;
 pub mod copy;
 pub mod info;
 pub mod recover;
+pub mod reindex;
 pub mod validate;
 
 use crate::error::{BagError, chain};

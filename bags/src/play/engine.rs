@@ -1,15 +1,27 @@
 //! What plays: the next message, its publisher, and when it is due.
 
-use std::time::{Duration, Instant};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::{Duration, Instant},
+};
 
 use swath_msgs::{builtin_interfaces::Time, rosgraph_msgs::Clock};
-use swath_ros::{Cdr, Publisher, RawPublisher, qos::SEND_TIMEOUT, stamp};
+use swath_ros::{Cdr, Publisher, RawPublisher, Shutdown, qos::SEND_TIMEOUT, stamp};
 
 use super::{lateness::Lateness, pace::Pace};
 use crate::{
     error::{Result, chain},
     reader::{Bag, Filter, Messages},
+    schema::{Schema, is_sendable, to_little_endian},
 };
+
+/// Publishers, and which of them a topic of the bag has.
+#[derive(Default)]
+pub(super) struct Outlets {
+    pub publishers: Vec<RawPublisher>,
+    /// By topic of the bag: index into `publishers`.
+    pub by_topic: Vec<Option<usize>>,
+}
 
 /// A message that is next.
 struct Pending {
@@ -17,6 +29,9 @@ struct Pending {
     log_time: u64,
     cdr: Cdr,
 }
+
+/// Faults that are told one by one.
+const MOST_FAULTS: usize = 100;
 
 /// Message bytes that may be under way at a time when nothing sets a pace.
 const UNDER_WAY_BYTES: usize = 16 << 20;
@@ -36,8 +51,11 @@ pub(super) struct Engine<'a> {
     filter: Filter,
     messages: Messages<'a>,
     pending: Option<Pending>,
-    /// By topic of the bag.
-    publishers: Vec<Option<RawPublisher>>,
+    outlets: Outlets,
+    /// Schemas of topics that have messages in another form than is sent.
+    schemas: BTreeMap<usize, Option<Schema>>,
+    /// Chunks and messages that could not be read, or not be brought into the form that is sent.
+    faults: BTreeSet<String>,
     /// Bytes published since all were last known to be acknowledged.
     under_way: usize,
     clock: Option<ClockPublisher>,
@@ -45,6 +63,7 @@ pub(super) struct Engine<'a> {
     pub published: u64,
     pub refused: u64,
     pub lateness: Lateness,
+    shutdown: Shutdown,
 }
 
 impl<'a> Engine<'a> {
@@ -52,9 +71,10 @@ impl<'a> Engine<'a> {
     pub(super) fn new(
         bag: &'a Bag,
         filter: Filter,
-        publishers: Vec<Option<RawPublisher>>,
+        outlets: Outlets,
         clock: Option<ClockPublisher>,
         pace: Pace,
+        shutdown: Shutdown,
     ) -> Result<Self> {
         let messages = bag.messages(&filter)?;
         let mut engine = Self {
@@ -62,29 +82,70 @@ impl<'a> Engine<'a> {
             filter,
             messages,
             pending: None,
-            publishers,
+            outlets,
+            schemas: BTreeMap::new(),
+            faults: BTreeSet::new(),
             under_way: 0,
             clock,
             pace,
             published: 0,
             refused: 0,
             lateness: Lateness::default(),
+            shutdown,
         };
         engine.load()?;
         Ok(engine)
     }
 
+    /// Reads the next message that can be; what is damaged is passed over, and told.
     fn load(&mut self) -> Result<()> {
-        let message = self.messages.next()?;
-        self.pending =
-            message.map(|m| Pending { topic: m.topic, log_time: m.log_time, cdr: Cdr::from_bytes(m.data.to_vec()) });
-        Ok(())
+        loop {
+            match self.messages.next() {
+                Ok(None) => {
+                    self.pending = None;
+                    return Ok(());
+                }
+                Ok(Some(m)) => {
+                    let (topic, log_time) = (m.topic, m.log_time);
+                    match sendable(self.bag, &mut self.schemas, topic, m.data) {
+                        Ok(cdr) => {
+                            self.pending = Some(Pending { topic, log_time, cdr: Cdr::from_bytes(cdr) });
+                            return Ok(());
+                        }
+                        Err(reason) => self.refuse(topic, &reason),
+                    }
+                }
+                Err(error) => self.note(chain(&error)),
+            }
+        }
+    }
+
+    /// Counts a message that cannot be played.
+    fn refuse(&mut self, topic: usize, reason: &str) {
+        self.refused += 1;
+        self.note(format!("{} is not played whole: {reason}", self.bag.topics()[topic].topic.name));
+    }
+
+    /// Tells a fault once, even if playing starts anew.
+    fn note(&mut self, fault: String) {
+        if self.faults.len() < MOST_FAULTS && !self.faults.contains(&fault) {
+            tracing::warn!("{fault}");
+            self.faults.insert(fault);
+        }
+    }
+
+    /// What could not be played.
+    pub(super) fn faults(&self) -> impl Iterator<Item = String> {
+        self.faults.iter().cloned()
     }
 
     /// Publishes what latched topics held before the first message.
     pub(super) fn publish_latched(&mut self, held: Vec<(usize, Vec<u8>)>) {
         for (topic, data) in held {
-            self.publish(topic, Cdr::from_bytes(data));
+            match sendable(self.bag, &mut self.schemas, topic, &data) {
+                Ok(data) => self.publish(topic, Cdr::from_bytes(data)),
+                Err(reason) => self.refuse(topic, &reason),
+            }
         }
     }
 
@@ -131,7 +192,7 @@ impl<'a> Engine<'a> {
         if self.pace.rate() == 0.0 {
             self.make_room(cdr.as_bytes().len());
         }
-        let Some(publisher) = &self.publishers[topic] else { return };
+        let Some(publisher) = self.outlets.by_topic[topic].map(|place| &self.outlets.publishers[place]) else { return };
         match publisher.publish(cdr) {
             Ok(()) => self.published += 1,
             Err(error) => {
@@ -157,6 +218,9 @@ impl<'a> Engine<'a> {
     /// Publishes one message while paused; time moves to it.
     pub(super) fn step(&mut self) -> Result<bool> {
         let Some(time) = self.pending.as_ref().map(|pending| pending.log_time) else { return Ok(false) };
+        if self.shutdown.asked() {
+            return Ok(false);
+        }
         self.pace.move_to(time, Instant::now());
         if self.clock.is_some() {
             self.publish_clock(time)?;
@@ -189,12 +253,12 @@ impl<'a> Engine<'a> {
         self.load()
     }
 
-    /// Waits until reliable readers have everything.
-    pub(super) fn flush(&self, timeout: Duration) {
+    /// Waits until reliable readers have everything; whether they have.
+    pub(super) fn flush(&self, timeout: Duration) -> bool {
         let deadline = Instant::now() + timeout;
-        for publisher in self.publishers.iter().flatten() {
-            publisher.flush(deadline.saturating_duration_since(Instant::now()));
-        }
+        let publishers = self.outlets.publishers.iter();
+        publishers
+            .fold(true, |all, publisher| publisher.flush(deadline.saturating_duration_since(Instant::now())) && all)
     }
 
     /// The log time at which the next clock message is due [ns].
@@ -213,4 +277,20 @@ impl<'a> Engine<'a> {
         }
         Ok(())
     }
+}
+
+/// A message in the form that is sent.
+fn sendable(
+    bag: &Bag,
+    schemas: &mut BTreeMap<usize, Option<Schema>>,
+    topic: usize,
+    data: &[u8],
+) -> Result<Vec<u8>, String> {
+    if is_sendable(data) {
+        return Ok(data.to_vec());
+    }
+    let schema = schemas.entry(topic).or_insert_with(|| bag.topics()[topic].parse_schema().ok());
+    let schema =
+        schema.as_ref().ok_or("a message is not little-endian CDR, and no schema tells how to turn it over")?;
+    to_little_endian(schema, data).map_err(|error| chain(&error))
 }

@@ -16,7 +16,7 @@ use swath_ros::{Node, RawPublisher, RosArgs, Shutdown, graph};
 
 use self::{
     control::{Control, follow_key},
-    engine::{ClockPublisher, Engine},
+    engine::{ClockPublisher, Engine, Outlets},
     keys::Keys,
     pace::Pace,
 };
@@ -36,8 +36,8 @@ const CHORES: Duration = Duration::from_millis(20);
 const TURN: usize = 256;
 /// Least number of samples that a publisher of a topic that is not latched can send again.
 const LEAST_DEPTH: u64 = 1024;
-/// How long readers may take to acknowledge the last messages [wall time].
-const LAST_MESSAGES: Duration = Duration::from_secs(5);
+/// How long readers may take to acknowledge the last messages unless somebody says otherwise [wall time].
+pub const LAST_MESSAGES: Duration = Duration::from_secs(5);
 /// How long the publishers stay after that: RustDDS drops what a reader has not yet taken when its
 /// writer goes [wall time].
 const FAREWELL: Duration = Duration::from_millis(500);
@@ -57,8 +57,8 @@ pub struct PlayOptions {
     pub repeat: bool,
     /// Log time after the bag's start at which playing starts [ns].
     pub start_offset: u64,
-    /// Log time after the bag's start at which playing ends [ns].
-    pub end_offset: Option<u64>,
+    /// Where playing ends.
+    pub end: End,
     /// Wait before the first message, so that readers are found [wall time].
     pub delay: Duration,
     /// Whether playing starts paused.
@@ -71,6 +71,34 @@ pub struct PlayOptions {
     pub qos_overrides: BTreeMap<String, QosOverride>,
     /// Whether keys control the player.
     pub keys: bool,
+    /// How long readers may take to acknowledge the last messages; without end when there is none [wall time].
+    pub acknowledged: Option<Duration>,
+}
+
+/// Where playing ends; at the bag's end where nothing else is said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct End {
+    /// Log time after the bag's start [ns].
+    pub offset: Option<u64>,
+    /// Log time after the start of playing [ns]; 0 plays nothing.
+    pub duration: Option<u64>,
+    /// Log time [ns]; with a duration, the later of both counts, as in rosbag2.
+    pub time: Option<u64>,
+}
+
+impl End {
+    /// The last log time that is played from one on; `None` when nothing is.
+    fn until(self, start: u64, from: u64) -> Option<u64> {
+        if let Some(offset) = self.offset {
+            return Some(start.saturating_add(offset));
+        }
+        match (self.duration, self.time) {
+            (None, None) => Some(u64::MAX),
+            (Some(0), None) => None,
+            (None | Some(0), Some(time)) => Some(time),
+            (Some(duration), time) => Some(from.saturating_add(duration).max(time.unwrap_or(0))),
+        }
+    }
 }
 
 /// How playing went.
@@ -84,6 +112,8 @@ pub struct PlaySummary {
     pub wall: Duration,
     /// Lateness that 99 % of the messages do not exceed.
     pub late_p99: Duration,
+    /// What of the bags could not be read or played.
+    pub faults: Vec<String>,
 }
 
 /// A player with its node.
@@ -114,14 +144,17 @@ impl Player {
     pub fn run(self, shutdown: &Shutdown, ready: impl FnOnce(usize)) -> Result<PlaySummary> {
         let bag = Bag::open_all(&self.options.bags, self.options.read)?;
         let (from, filter) = self.span(&bag)?;
-        let publishers = self.publishers(&bag)?;
-        let count = publishers.iter().flatten().count();
+        let outlets = self.outlets(&bag)?;
+        let count = outlets.publishers.len();
         let clock = self.clock()?;
         let control = Control::new(&self.node)?;
         let keys = if self.options.keys { Keys::listen() } else { None };
         let latched = latched_before(&bag, &filter)?;
         let pace = Pace::new(self.options.rate, from, Instant::now(), self.options.paused);
-        let mut engine = Engine::new(&bag, filter, publishers, clock, pace)?;
+        let mut engine = Engine::new(&bag, filter, outlets, clock, pace, shutdown.clone())?;
+        for fault in bag.faults() {
+            tracing::warn!("{fault}");
+        }
         ready(count);
         self.pause_before_start(shutdown)?;
         engine.publish_latched(latched);
@@ -129,14 +162,28 @@ impl Player {
         let start = Instant::now();
         self.play(&mut engine, &control, keys.as_ref(), from, shutdown)?;
         let wall = start.elapsed();
-        engine.flush(LAST_MESSAGES);
+        self.await_acknowledgements(&engine, shutdown);
         std::thread::sleep(FAREWELL);
+        let mut faults = bag.faults().to_vec();
+        faults.extend(engine.faults());
         Ok(PlaySummary {
             published: engine.published,
             refused: engine.refused,
             wall,
             late_p99: engine.lateness.quantile(0.99),
+            faults,
         })
+    }
+
+    /// Waits until reliable readers have everything, but not long once the end is asked for.
+    fn await_acknowledgements(&self, engine: &Engine<'_>, shutdown: &Shutdown) {
+        let start = Instant::now();
+        let in_time = || self.options.acknowledged.is_none_or(|limit| start.elapsed() < limit);
+        while in_time() && !engine.flush(CHORES) {
+            if shutdown.asked() && start.elapsed() > FAREWELL {
+                break;
+            }
+        }
     }
 
     fn play(
@@ -167,6 +214,10 @@ impl Player {
             match engine.wait(Instant::now()) {
                 Some(Duration::ZERO) => {
                     for _ in 0..TURN {
+                        // A reader that has stopped makes each message wait.
+                        if shutdown.asked() {
+                            break;
+                        }
                         engine.play_due(Instant::now())?;
                     }
                 }
@@ -200,18 +251,36 @@ impl Player {
             let reason = format!("{} ns is past the bag's end at {} ns", self.options.start_offset, end - start);
             return Err(BagError::Option { option: "--start-offset", reason });
         }
-        let until = self.options.end_offset.map_or(u64::MAX, |offset| start.saturating_add(offset));
-        Ok((from, Filter { topics: self.options.topics.clone(), from, until }))
+        let topics = self.options.topics.clone();
+        let filter = match self.options.end.until(start, from) {
+            Some(until) => Filter { topics, from, until },
+            None => Filter { topics: TopicPattern::only(Vec::new()), from, until: from },
+        };
+        Ok((from, filter))
     }
 
-    /// A publisher for each topic that is played.
-    fn publishers(&self, bag: &Bag) -> Result<Vec<Option<RawPublisher>>> {
+    /// A publisher for each topic that is played, however often the bag has its name.
+    fn outlets(&self, bag: &Bag) -> Result<Outlets> {
         let known: BTreeSet<&str> = bag.topics().iter().map(|t| t.topic.name.as_str()).collect();
         if let Some(unknown) = self.options.qos_overrides.keys().find(|name| !known.contains(name.as_str())) {
             let reason = format!("the bag has no topic {unknown}");
             return Err(BagError::Option { option: "--qos-profile-overrides-path", reason });
         }
-        bag.topics().iter().map(|topic| self.publisher(topic)).collect()
+        let mut outlets = Outlets::default();
+        let mut places = BTreeMap::new();
+        for topic in bag.topics() {
+            let key = (topic.topic.name.as_str(), topic.topic.full_type_name());
+            let place = match places.get(&key) {
+                Some(place) => *place,
+                None => self.publisher(topic)?.map(|publisher| {
+                    outlets.publishers.push(publisher);
+                    outlets.publishers.len() - 1
+                }),
+            };
+            places.insert(key, place);
+            outlets.by_topic.push(place);
+        }
+        Ok(outlets)
     }
 
     fn publisher(&self, topic: &BagTopic) -> Result<Option<RawPublisher>> {
@@ -232,8 +301,10 @@ impl Player {
         if let Some(change) = self.options.qos_overrides.get(name) {
             qos = change.apply(qos);
         }
-        let renamed = self.options.remap.get(name).unwrap_or(name);
-        match self.node.raw_publisher(renamed, &topic.topic.type_name, &to_ros(&qos)) {
+        // A name in a bag is a full one, with or without its slash.
+        let full = format!("/{}", name.trim_start_matches('/'));
+        let renamed = self.options.remap.get(name).or(self.options.remap.get(&full)).unwrap_or(&full);
+        match self.node.raw_publisher(renamed, &topic.topic.full_type_name(), &to_ros(&qos)) {
             Ok(publisher) => Ok(Some(publisher)),
             Err(error) => {
                 tracing::warn!("{name} is not played: {}", chain(&error));
@@ -263,7 +334,10 @@ fn latched_before(bag: &Bag, filter: &Filter) -> Result<Vec<(usize, Vec<u8>)>> {
     let topics = TopicPattern::new(&names, None, None)?;
     let mut messages = bag.messages(&Filter { topics, from: 0, until: filter.from - 1 })?;
     let mut held: Vec<(usize, Vec<u8>)> = Vec::new();
-    while let Some(message) = messages.next()? {
+    loop {
+        // What is damaged is told when it is played.
+        let Ok(message) = messages.next() else { continue };
+        let Some(message) = message else { break };
         let same = |(topic, _): &(usize, Vec<u8>)| *topic == message.topic;
         if held.iter().filter(|held| same(held)).count() >= depth(&bag.topics()[message.topic])
             && let Some(oldest) = held.iter().position(same)
@@ -273,4 +347,20 @@ fn latched_before(bag: &Bag, filter: &Filter) -> Result<Vec<(usize, Vec<u8>)>> {
         held.push((message.topic, message.data.to_vec()));
     }
     Ok(held)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_playing_ends() {
+        let until = |offset, duration, time| End { offset, duration, time }.until(100, 110);
+        assert_eq!(until(None, None, None), Some(u64::MAX));
+        assert_eq!(until(Some(5), None, None), Some(105));
+        assert_eq!(until(None, Some(5), None), Some(115));
+        assert_eq!(until(None, Some(0), None), None, "nothing is played");
+        assert_eq!(until(None, Some(0), Some(7)), Some(7));
+        assert_eq!((until(None, Some(5), Some(7)), until(None, Some(5), Some(200))), (Some(115), Some(200)));
+    }
 }

@@ -56,6 +56,19 @@ impl Listing {
         Ok(listing)
     }
 
+    /// All bag files in a directory.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub(crate) fn of_all_in(dir: &Path) -> Result<Self> {
+        let files = files_in(dir)?;
+        if files.is_empty() {
+            let reason = "it holds no .mcap or .db3 file".to_owned();
+            return Err(BagError::NotABag { path: dir.to_owned(), reason });
+        }
+        Ok(Self { files, ..Self::default() })
+    }
+
     fn take_listed(&mut self, dir: &Path, information: &BagInformation, there: &[PathBuf]) {
         // Up to version 3 the list began with the directory's name.
         let base = if information.version < 4 { dir.parent().unwrap_or(dir) } else { dir };
@@ -63,6 +76,7 @@ impl Listing {
             let file = base.join(listed);
             let beside = || dir.join(Path::new(listed).file_name().unwrap_or_default());
             match [file.clone(), beside()].into_iter().find(|file| file.is_file()) {
+                Some(file) if self.files.contains(&file) => {}
                 Some(file) => self.files.push(file),
                 None => self.faults.push(format!("{} is missing, the bag's list has it", file.display())),
             }

@@ -126,6 +126,13 @@ impl Bag {
         Self::open_all(&[path.to_owned()], ReadOptions::default())
     }
 
+    /// Opens all bag files in a directory, whatever its `metadata.yaml` says.
+    pub(crate) fn open_directory(dir: &Path, options: ReadOptions) -> Result<Self> {
+        let mut bag = Self::empty(dir.to_owned());
+        bag.open_files(&Listing::of_all_in(dir)?.files, options)?;
+        Ok(bag)
+    }
+
     /// Opens several bags as one. Files that cannot be read are left out and told by [`faults`](Self::faults), as long
     /// as one can.
     ///
@@ -134,31 +141,37 @@ impl Bag {
     pub fn open_all(paths: &[PathBuf], options: ReadOptions) -> Result<Self> {
         let mut bag = Self::empty(paths.first().cloned().unwrap_or_default());
         let mut files = Vec::new();
-        let mut first_error = None;
         for path in paths {
             let listing = Listing::of(path)?;
             check_compression(path, listing.information.as_ref())?;
             bag.faults.extend(listing.faults);
             let unlisted = listing.unlisted.iter().map(|f| format!("{} is not in the bag's list", f.display()));
             bag.faults.extend(unlisted);
-            for file in &listing.files {
-                match open_file(file, options) {
-                    Ok(index) => files.push(index),
-                    Err(error) => {
-                        bag.faults.push(format!("not read: {}", chain(&error)));
-                        first_error.get_or_insert(error);
-                    }
-                }
-            }
+            files.extend(listing.files);
             if let [_] = paths {
                 bag.information = listing.information;
             }
         }
-        if let (true, Some(error)) = (files.is_empty(), first_error) {
-            return Err(error);
-        }
-        bag.take_files(files)?;
+        bag.open_files(&files, options)?;
         Ok(bag)
+    }
+
+    fn open_files(&mut self, paths: &[PathBuf], options: ReadOptions) -> Result<()> {
+        let mut files = Vec::new();
+        let mut first_error = None;
+        for path in paths {
+            match open_file(path, options) {
+                Ok(index) => files.push(index),
+                Err(error) => {
+                    self.faults.push(format!("not read: {}", chain(&error)));
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+        match first_error {
+            Some(error) if files.is_empty() => Err(error),
+            _ => self.take_files(files),
+        }
     }
 
     /// Opens an MCAP file whose bytes are in memory.
@@ -256,6 +269,11 @@ impl Bag {
     /// A name stands more than once where its type, schema or metadata differ.
     pub fn topics(&self) -> &[BagTopic] {
         &self.topics
+    }
+
+    /// The topics, to be changed on their way into another bag.
+    pub(crate) fn topics_mut(&mut self) -> impl Iterator<Item = &mut Topic> {
+        self.topics.iter_mut().map(|topic| &mut topic.topic)
     }
 
     /// Files in order of time.

@@ -1,5 +1,7 @@
 //! Which topics and which span of time.
 
+use std::collections::HashSet;
+
 use regex::Regex;
 
 use super::BagTopic;
@@ -10,7 +12,7 @@ use crate::error::{BagError, Result};
 pub struct TopicPattern {
     names: Vec<String>,
     regex: Option<Regex>,
-    exclude: Option<Regex>,
+    exclude: Vec<Regex>,
 }
 
 impl TopicPattern {
@@ -23,8 +25,26 @@ impl TopicPattern {
         Ok(Self {
             names: names.to_vec(),
             regex: regex.map(|r| whole("--regex", r)).transpose()?,
-            exclude: exclude.map(|r| whole("--exclude", r)).transpose()?,
+            exclude: exclude.map(|r| whole("--exclude", r)).transpose()?.into_iter().collect(),
         })
+    }
+
+    /// Takes more topics away: names, or expressions for whole names.
+    ///
+    /// # Errors
+    /// [`BagError::Option`] when an expression is malformed.
+    pub fn without(mut self, topics: &[String]) -> Result<Self> {
+        for topic in topics {
+            self.exclude.push(whole("--exclude-topics", topic)?);
+        }
+        Ok(self)
+    }
+
+    /// Exactly these names, none if there are none.
+    pub(crate) fn only(names: Vec<String>) -> Self {
+        // Nothing is before the start of a text.
+        let nothing = names.is_empty().then(|| Regex::new("a^").ok()).flatten();
+        Self { names, regex: nothing, exclude: Vec::new() }
     }
 
     /// Whether a topic is selected.
@@ -32,7 +52,7 @@ impl TopicPattern {
         let all = self.names.is_empty() && self.regex.is_none();
         let named = self.names.iter().any(|name| name == topic);
         let matched = self.regex.as_ref().is_some_and(|regex| regex.is_match(topic));
-        let excluded = self.exclude.as_ref().is_some_and(|regex| regex.is_match(topic));
+        let excluded = self.exclude.iter().any(|regex| regex.is_match(topic));
         (all || named || matched) && !excluded
     }
 
@@ -42,7 +62,8 @@ impl TopicPattern {
     }
 }
 
-fn whole(option: &'static str, pattern: &str) -> Result<Regex> {
+/// An expression that must match a whole name.
+pub(crate) fn whole(option: &'static str, pattern: &str) -> Result<Regex> {
     Regex::new(&format!("^(?:{pattern})$")).map_err(|e| BagError::Option { option, reason: e.to_string() })
 }
 
@@ -67,8 +88,9 @@ impl Default for Filter {
 impl Filter {
     /// By topic index: whether it is read.
     pub(super) fn selected(&self, topics: &[BagTopic]) -> Result<Vec<bool>> {
+        let known: HashSet<&str> = topics.iter().map(|t| t.topic.name.as_str()).collect();
         for name in self.topics.names() {
-            if !topics.iter().any(|t| t.topic.name == *name) {
+            if !known.contains(name.as_str()) {
                 let reason = format!("the bag has no topic {name}");
                 return Err(BagError::Option { option: "--topic", reason });
             }
@@ -92,5 +114,8 @@ mod tests {
         assert!(!pattern.selects("/prefix/x/y"), "expressions match whole names");
         assert!(TopicPattern::default().selects("/anything"));
         assert!(TopicPattern::new(&[], Some("("), None).is_err());
+        let pattern = TopicPattern::default().without(&["/x/.*".to_owned(), "/y".to_owned()]).unwrap();
+        assert!(pattern.selects("/a") && pattern.selects("/yy") && !pattern.selects("/x/y") && !pattern.selects("/y"));
+        assert!(!TopicPattern::only(Vec::new()).selects("/a"));
     }
 }

@@ -49,11 +49,22 @@ pub fn decode(schema: &Schema, data: &[u8], visitor: &mut dyn Visitor) -> Result
     Decoder::new(schema, data, None).whole(visitor)
 }
 
-/// Where the numbers of a message are that have more than one byte: offset and size of each.
+/// A number of more than one byte in a message.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Number {
+    /// Offset of the padding before it, which may be none.
+    pub padding: usize,
+    /// Its offset.
+    pub at: usize,
+    /// Its size [bytes].
+    pub size: usize,
+}
+
+/// Where the numbers of a message are that have more than one byte, in order.
 ///
 /// # Errors
 /// As [`decode`].
-pub(super) fn numbers(schema: &Schema, data: &[u8]) -> Result<Vec<(usize, usize)>> {
+pub(super) fn numbers(schema: &Schema, data: &[u8]) -> Result<Vec<Number>> {
     struct Nothing;
     impl Visitor for Nothing {}
     let mut places = Vec::new();
@@ -62,7 +73,7 @@ pub(super) fn numbers(schema: &Schema, data: &[u8]) -> Result<Vec<(usize, usize)
 }
 
 /// The encapsulation header, which alignment does not count.
-const HEADER: usize = 4;
+pub(super) const HEADER: usize = 4;
 
 struct Decoder<'a> {
     schema: &'a Schema,
@@ -72,11 +83,11 @@ struct Decoder<'a> {
     /// Greatest alignment: 8, and 4 in the second version of CDR.
     alignment: usize,
     /// Where the places of numbers are noted, if they are wanted.
-    places: Option<&'a mut Vec<(usize, usize)>>,
+    places: Option<&'a mut Vec<Number>>,
 }
 
 impl<'a> Decoder<'a> {
-    fn new(schema: &'a Schema, data: &'a [u8], places: Option<&'a mut Vec<(usize, usize)>>) -> Self {
+    fn new(schema: &'a Schema, data: &'a [u8], places: Option<&'a mut Vec<Number>>) -> Self {
         Self { schema, data, at: 0, little: true, alignment: 8, places }
     }
 
@@ -122,11 +133,11 @@ impl<'a> Decoder<'a> {
     }
 
     fn take_array<const N: usize>(&mut self) -> Result<[u8; N]> {
-        let position = self.at - HEADER;
+        let (before, position) = (self.at, self.at - HEADER);
         let padding = position.next_multiple_of(N.min(self.alignment)) - position;
         self.take(padding)?;
         if let Some(places) = self.places.as_mut().filter(|_| N > 1) {
-            places.push((self.at, N));
+            places.push(Number { padding: before, at: self.at, size: N });
         }
         let mut bytes = [0; N];
         bytes.copy_from_slice(self.take(N)?);

@@ -7,6 +7,7 @@ mod turn;
 
 pub use decode::{Scalar, Visitor, decode};
 pub use json::to_json;
+pub(crate) use turn::is_sendable;
 pub use turn::to_little_endian;
 
 use crate::{

@@ -86,9 +86,16 @@ impl Program {
 
     /// Interrupts it as Ctrl-C does, and waits for the end.
     pub fn interrupt(self) -> (ExitStatus, Value) {
-        let pid = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
-        let (status, last) = self.end();
+        let (status, last) = self.signalled(&["-INT"]);
         (status, last.unwrap())
+    }
+
+    /// Sends it signals, one right behind the other, and waits for the end.
+    pub fn signalled(self, signals: &[&str]) -> (ExitStatus, Option<Value>) {
+        let pid = self.child.id().to_string();
+        for signal in signals {
+            assert!(Command::new("kill").args([signal, &pid.as_str()]).status().unwrap().success());
+        }
+        self.end()
     }
 }

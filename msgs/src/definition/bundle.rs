@@ -36,6 +36,8 @@ enum Kind {
 /// # Errors
 /// [`DefinitionError`] when a line is not of the grammar.
 pub fn definitions(type_name: &str, text: &str) -> Result<Vec<Named>, DefinitionError> {
+    // Some editors put a byte order mark before a text.
+    let text = text.trim_start_matches('\u{feff}');
     let mut all = Vec::new();
     for section in sections(type_name, text)? {
         // A name without a package is one that no ROS 2 gave.
@@ -219,5 +221,6 @@ mod tests {
         assert!(names("a/action/F_FeedbackMessage", "---\n---\nint8 z\n").contains(&"a/F_FeedbackMessage".to_owned()));
         assert_eq!(names("a/msg/E", ""), ["a/E"], "a message without fields");
         assert_eq!(names("E", "int8 x\nF f\n"), ["E"], "a name without a package");
+        assert_eq!(names("a/msg/B", "\u{feff}int8 x\r\n"), ["a/B"], "as some editors write it");
     }
 }

@@ -1,14 +1,14 @@
-//! One topic that is being recorded.
+//! One topic that is listened to.
 
 use swath_ros::{RawSample, RawSubscription, graph};
 
 use super::stamp::StampPlace;
-use crate::{error::Result, schema::Schema, topic::Topic, writer::TopicId};
+use crate::{error::Result, schema::Schema, topic::Topic};
 
 /// Messages that are taken from one topic before the others have their turn.
 const TURN: usize = 8192;
 
-/// A message on its way into the bag.
+/// A message on its way to the sink.
 pub(super) struct Taken {
     /// Number of its source.
     pub source: usize,
@@ -23,10 +23,9 @@ impl Taken {
     }
 }
 
-/// A subscription with what is needed to record it.
+/// A subscription with what is needed to tell its messages' time.
 pub(super) struct Source {
-    pub name: String,
-    pub topic: TopicId,
+    pub topic: Topic,
     pub is_clock: bool,
     subscription: RawSubscription,
     stamp: StampPlace,
@@ -36,24 +35,16 @@ pub(super) struct Source {
 
 impl Source {
     pub(super) fn new(
-        topic: &Topic,
-        id: TopicId,
+        topic: Topic,
         subscription: RawSubscription,
         entry: Option<&'static graph::Entry>,
     ) -> Result<Self> {
         let stamp = match topic.schema().is_empty() {
             true => StampPlace::Nowhere,
-            false => StampPlace::of(&Schema::of(topic)?),
+            false => StampPlace::of(&Schema::of(&topic)?),
         };
-        Ok(Self {
-            name: topic.name.clone(),
-            topic: id,
-            is_clock: topic.type_name == "rosgraph_msgs/msg/Clock",
-            subscription,
-            stamp,
-            entry,
-            lost: 0,
-        })
+        let is_clock = topic.name == "/clock" && topic.type_name == "rosgraph_msgs/msg/Clock";
+        Ok(Self { topic, is_clock, subscription, stamp, entry, lost: 0 })
     }
 
     /// Takes what has come.
