@@ -1,22 +1,10 @@
-//! The nodes of Swath: spacecraft, guidance, request manager and planner, the launcher, and missions in one process.
-//!
-//! A node is two files: `logic.rs`, which knows no ROS, and `wiring.rs`, which knows nothing else.
-#![expect(non_snake_case, reason = "frame letters")]
+//! What the programs of a mission link besides the nodes: the learned policies.
 
-pub mod approval;
-pub mod bag;
-pub mod from_msg;
-pub mod guidance;
-pub mod in_process;
-pub mod launch;
-pub mod mission;
-pub mod node;
-pub mod operate;
-pub mod planner;
-pub mod planners;
-pub mod record;
-pub mod requests;
-pub mod requests_file;
-pub mod spacecraft;
-pub mod time_text;
-pub mod to_msg;
+use swath_mission::guarded::Policies;
+
+/// The policies that these programs can fly.
+pub const POLICIES: Policies = Policies {
+    make: |spec, seed| Ok(swath_training::planners::make(spec, seed)?),
+    digest: |spec| Ok(swath_training::planners::digest(spec)?),
+    revision: swath_training::checkpoint::REVISION,
+};

@@ -11,7 +11,10 @@ use std::process::{Command, Output, Stdio};
 use serde_json::Value;
 use swath_bags::cli::{MANIFEST, MANIFEST_TEXT};
 use swath_bags::{Bag, BagOptions, BagWriter, Filter};
-use swath_nodes::bag::recorded::{NAMESPACE, Recorded};
+use swath_ground::debrief::recorded::{NAMESPACE, Recorded};
+use swath_mission::approval::Mode;
+use swath_mission::orders::action::Act;
+use swath_mission::requests::logic::Review;
 
 fn sample() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../bags/samples/mission")
@@ -141,7 +144,7 @@ fn a_flight_that_went_another_way_than_its_manifest_is_found() {
 }
 
 #[test]
-fn requests_of_a_mission_in_flight_come_at_the_same_decisions_again() {
+fn what_operators_did_in_flight_is_flown_again() {
     let folder = tempfile::tempdir().unwrap();
     let mission = common::write_mission(folder.path(), "orbits = 8.0\n[requests.random]\ncount = [200, 200]\n");
     let out = folder.path().join("out");
@@ -155,15 +158,33 @@ fn requests_of_a_mission_in_flight_come_at_the_same_decisions_again() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     let requests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/requests");
+    let operate = |words: &[&str], numbers: std::ops::Range<u32>| {
+        // Some come too late for their strip and are refused: the mission flies on.
+        let numbers = numbers.map(|number| number.to_string());
+        common::command("swath", &domain).args(words).args(numbers).output().unwrap();
+    };
+    operate(&["strips", "hold"], 100..120);
+    operate(&["strips", "release"], 100..110);
+    operate(&["strips", "cancel", "--reason", "clouds"], 120..140);
+    operate(&["planner", "mode", "approve"], 0..0);
+    operate(&["planner", "mode", "autonomous"], 0..0);
     for file in ["coasts.geojson", "rivers.geojson"] {
-        // Some may be refused: the mission flies on, and a strip's last window may have passed.
-        common::command("swath", &domain).args(["strips", "submit"]).arg(requests.join(file)).status().unwrap();
+        operate(&["strips", "submit", text(&requests.join(file))], 0..0);
     }
+    operate(&["strips", "replace", "160", text(&requests.join("replacement.geojson"))], 0..0);
     assert!(launch.wait().unwrap().success());
     let bag = out.join("bag");
-    let arrivals = Recorded::open(&bag, NAMESPACE).unwrap().arrivals().unwrap();
-    let late = arrivals.iter().filter(|arrival| arrival.decision > 3).count();
-    assert!(late > 10 && late < arrivals.len(), "{late} of {}", arrivals.len());
+    let (actions, operators) = Recorded::open(&bag, NAMESPACE).unwrap().actions().unwrap();
+    let late = actions.iter().filter(|action| !action.initial).count();
+    assert!(late > 10 && late < actions.len(), "{late} of {}", actions.len());
+    for (what, found) in [
+        ("cancelled", actions.iter().any(|it| matches!(it.act, Act::Cancel(_)))),
+        ("held", actions.iter().any(|it| matches!(it.act, Act::Review(_, Review::Hold)))),
+        ("released", actions.iter().any(|it| matches!(it.act, Act::Review(_, Review::Release)))),
+        ("set to approve", operators.iter().any(|it| it.act == Act::SetMode(Mode::Approve))),
+    ] {
+        assert!(found, "nothing was {what}");
+    }
     let again = folder.path().join("again.jsonl");
     common::succeed(&mut swath_bag(&["refly", text(&bag), "--tasks", text(&again)]));
     assert_eq!(fs::read_to_string(again).unwrap(), fs::read_to_string(tasks).unwrap());
@@ -180,7 +201,7 @@ fn exports_are_read_by_others() {
     let imaged = recorded.imaged().len() as u64;
     assert_eq!(read["tasks"].as_u64().unwrap(), recorded.tasks.len() as u64, "{read}");
     assert_eq!(read["imaged"].as_u64().unwrap(), imaged);
-    let reward: f64 = recorded.tasks.iter().map(|(record, _)| record.reward).sum();
+    let reward: f64 = recorded.tasks.iter().map(|(task, _)| task.reward).sum();
     assert!((read["reward"].as_f64().unwrap() - reward).abs() < 1e-9);
     // 0.3 orbits are 1710.5 s: 3421 ticks and the state at the epoch; a point every ten seconds and the last.
     assert_eq!(read["states"], 3422);
@@ -262,7 +283,7 @@ fn the_report_shows_what_was_flown() {
     assert!(count("map", "#E8E4DA") > 100, "land");
     assert!((1..=3).contains(&count("map", blue)), "the ground track, cut at the antimeridian");
     assert_eq!(count("timeline", green), imaged, "a bar for each strip that was imaged");
-    let transitions = recorded.tasks.iter().filter(|(record, _)| record.t_pre > 0).count() as u64;
+    let transitions = recorded.tasks.iter().filter(|(task, _)| task.record.t_pre > 0).count() as u64;
     assert_eq!(count("timeline", amber), transitions);
     assert_eq!(count("timeline", red), recorded.tasks.len() as u64 - imaged);
     for figure in ["attitude", "wheel-speed", "wheel-torque", "reward", "requests"] {

@@ -49,3 +49,24 @@ fn the_heuristic_takes_over_from_a_policy_that_is_not_there() {
         "{alarms}"
     );
 }
+
+#[test]
+fn satellites_that_differ_from_their_model_and_planners_that_wait_are_the_same_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let errors = "[plant]\ntorque_limit_scale = 0.9\ninertia_scale = 1.05\nattitude_noise_rad = 2e-4\n\
+                  rate_noise_rad_s = 6e-5\nplanning_delay_s = 1.0\n";
+    let approval = "[approval]\nmode = \"approve\"\ndeadline_s = 20.0\nat_deadline = \"fly\"\n";
+    for (name, addition) in [("errors", errors), ("approval", approval)] {
+        let mission = common::write_mission(folder.path(), &format!("{MISSION}{addition}"));
+        for planner in ["beam", "random", "hop-ppo"] {
+            let out = |kind: &str| folder.path().join(format!("{name}-{planner}-{kind}"));
+            let words = ["--planner", planner, "--orbits", "0.5"];
+            let in_process = tasks(&mission, &out("in-process"), &[&words[..], &["--in-process"]].concat());
+            let over_dds = tasks(&mission, &out("dds"), &words);
+            assert_eq!(over_dds, in_process, "{name}, planner {planner}");
+            assert!(in_process.lines().count() > 10);
+            let bag = out("dds").join("bag");
+            common::succeed(common::command("swath-bag", "0").arg("refly").arg(bag));
+        }
+    }
+}

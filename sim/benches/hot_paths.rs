@@ -5,17 +5,19 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use swath_sim::catalogue::Catalogue;
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig};
-use swath_sim::flight::Flight;
+use swath_sim::learn::episode::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
-use swath_sim::orbit::Orbit;
 use swath_sim::planner::{Decision, Heuristic, Planner};
+use swath_sim::requests::catalogue::Catalogue;
+use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
-use swath_sim::scenario::{InitialState, ScenarioConfig};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::spacecraft::Spacecraft;
+use swath_sim::world::orbit::Orbit;
 
 fn model() -> Arc<Model> {
     Arc::new(Model::new(SimConfig::default()).unwrap())
@@ -29,7 +31,7 @@ fn closed_loop(c: &mut Criterion) {
     let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
     c.bench_function("fly one task of some 300 ticks", |b| {
         b.iter_batched(
-            || Flight::new(&model, &model, &initial),
+            || Flight::new(&model, Spacecraft::new(&model, &initial)),
             |mut flight| flight.fly(task, Tick(u64::MAX)),
             criterion::BatchSize::SmallInput,
         );

@@ -6,18 +6,20 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
-use swath_sim::catalogue::Catalogue;
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig};
-use swath_sim::flight::Flight;
+use swath_sim::learn::episode::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
-use swath_sim::orbit::Orbit;
 use swath_sim::planner::{Beam, Heuristic, Lookahead, Planner};
+use swath_sim::requests::catalogue::Catalogue;
+use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
-use swath_sim::scenario::{InitialState, ScenarioConfig};
-use swath_sim::strip::StripRequest;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::spacecraft::Spacecraft;
+use swath_sim::world::orbit::Orbit;
+use swath_sim::world::strip::StripRequest;
 
 /// Each figure is the median of this many runs.
 const RUNS: usize = 9;
@@ -55,7 +57,8 @@ fn closed_loop(model: &Arc<Model>) -> Result<f64> {
     let mut rates = Vec::new();
     for seed in 0..RUNS as u64 {
         let env = Env::episode(model.clone(), &EpisodeConfig::evaluation(), seed);
-        let mut flight = Flight::new(model, model, &InitialState::draw(&model.config, &mut rng::stream(seed, 0)));
+        let initial = InitialState::draw(&model.config, &mut rng::stream(seed, rng::INITIAL_STATE));
+        let mut flight = Flight::new(model, Spacecraft::new(model, &initial));
         let context = env.context();
         let tasks = (0..context.candidates.len())
             .map(|candidate| swath_sim::planner::Decision::Image { candidate, t_pre: 160 }.to_task(&context))

@@ -1,4 +1,6 @@
 //! Configuration: everything of the paper's Table 2 and of the unprinted settings, with their defaults.
+//!
+//! `docs/paper-comparison.md` says which defaults are not the paper's.
 
 use serde::{Deserialize, Serialize};
 
@@ -124,7 +126,7 @@ pub struct PlanningConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RequestLimits {
-    /// Shortest strip [km].
+    /// Shortest strip [km]; operators may ask for shorter ones than the paper's L_min of 100 km, which random requests keep.
     pub length_min_km: f64,
     /// Longest strip [km]; also L_max, the scale of the observation.
     pub length_max_km: f64,
@@ -229,10 +231,11 @@ impl SimConfig {
             ("spacecraft.wheel_speed_max_rpm", s.wheel_speed_max_rpm, 1.0, 1e5),
             ("spacecraft.wheel_speed_initial_max_rpm", s.wheel_speed_initial_max_rpm, 0.0, s.wheel_speed_max_rpm),
             ("spacecraft.rate_initial_max_rad_s", s.rate_initial_max_rad_s, 0.0, 0.1),
-            ("control.k1", c.k1, 0.0, 100.0),
+            // Without K1 or P nothing turns the satellite; K3 and Ki only help, and may be 0.
+            ("control.k1", c.k1, GAIN_MIN, 100.0),
             ("control.k3", c.k3, 0.0, 100.0),
             ("control.omega_max_deg_s", c.omega_max_deg_s, 0.01, 360.0),
-            ("control.servo_p", c.servo_p, 0.0, 1e5),
+            ("control.servo_p", c.servo_p, GAIN_MIN, 1e5),
             ("control.servo_ki", c.servo_ki, 0.0, 1e5),
             ("control.servo_integral_limit", c.servo_integral_limit, 0.0, 10.0),
             ("imaging.sigma_max", self.imaging.sigma_max, 1e-6, 1.0),
@@ -247,9 +250,24 @@ impl SimConfig {
         ] {
             in_range(name, value, min, max)?;
         }
+        possible_body(s.inertia_kg_m2)?;
         ordered("requests.length_km", self.requests.length_min_km, self.requests.length_max_km)?;
         ordered("requests.speed_m_s", self.requests.speed_min_m_s, self.requests.speed_max_m_s)
     }
+}
+
+/// Least gain that the satellite cannot do without.
+const GAIN_MIN: f64 = 1e-6;
+
+/// Refuses principal inertias that no body has: ∫(y²+z²)dm is at most ∫(x²+z²)dm + ∫(x²+y²)dm. A flat plate reaches the
+/// limit, so what rounding does to it is let pass.
+fn possible_body([x, y, z]: [f64; 3]) -> Result<(), SimError> {
+    for (axis, own, others) in [(0, x, y + z), (1, y, z + x), (2, z, x + y)] {
+        if own > others * (1.0 + 1e-9) {
+            return Err(SimError::Inertia { axis, own, others });
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a value outside [min, max], and NaN.
@@ -283,6 +301,38 @@ mod tests {
         let mut config = SimConfig::default();
         config.requests.length_min_km = 600.0;
         assert!(matches!(config.validate(), Err(SimError::EmptyRange { .. })));
+    }
+
+    #[test]
+    fn inertias_that_no_body_has_are_refused() {
+        let with = |inertia| {
+            let mut config = SimConfig::default();
+            config.spacecraft.inertia_kg_m2 = inertia;
+            config.validate().map_err(|error| error.to_string())
+        };
+        let wanted =
+            "spacecraft.inertia_kg_m2[1] is 98.4, more than the other two together, 98.3: no body is like that";
+        assert_eq!(with([40.2, 98.4, 58.1]), Err(wanted.to_owned()));
+        assert!(with([10.0, 1.0, 2.0]).unwrap_err().starts_with("spacecraft.inertia_kg_m2[0] is 10"));
+        assert!(with([1.0, 2.0, 3.5]).unwrap_err().starts_with("spacecraft.inertia_kg_m2[2] is 3.5"));
+        assert_eq!(with([0.1, 0.2, 0.1 + 0.2]), Ok(()), "a flat plate, whose sum is rounded");
+    }
+
+    #[test]
+    fn gains_without_which_nothing_turns_are_not_zero() {
+        for (name, change) in [
+            ("control.k1", (|it| it.k1 = 0.0) as fn(&mut ControlConfig)),
+            ("control.servo_p", |it| it.servo_p = 0.0),
+            ("control.omega_max_deg_s", |it| it.omega_max_deg_s = 0.0),
+        ] {
+            let mut config = SimConfig::default();
+            change(&mut config.control);
+            let text = config.validate().unwrap_err().to_string();
+            assert!(text.starts_with(&format!("{name} is 0, outside")), "{text}");
+        }
+        let mut config = SimConfig::default();
+        (config.control.k3, config.control.servo_ki, config.control.servo_integral_limit) = (0.0, 0.0, 0.0);
+        config.validate().unwrap();
     }
 
     #[test]

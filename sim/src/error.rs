@@ -27,6 +27,18 @@ pub enum SimError {
         /// Upper end given.
         max: f64,
     },
+    /// Principal inertias that no rigid body has.
+    #[error(
+        "spacecraft.inertia_kg_m2[{axis}] is {own}, more than the other two together, {others}: no body is like that"
+    )]
+    Inertia {
+        /// Index of the axis.
+        axis: usize,
+        /// Its inertia [kg m²].
+        own: f64,
+        /// Sum of the other two [kg m²].
+        others: f64,
+    },
     /// A control frequency whose period is no whole number of nanoseconds.
     #[error(
         "control frequency {frequency_hz} Hz is outside 0.1 to 100 Hz or its period is not a whole number of nanoseconds"

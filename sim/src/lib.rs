@@ -7,23 +7,16 @@
 //! Task Scheduling in High-Resolution Super-Agile Satellites".
 #![expect(non_snake_case, reason = "frame letters")]
 
-pub mod catalogue;
 pub mod config;
-pub mod control;
-pub mod dynamics;
-pub mod env;
 pub mod error;
-pub mod flight;
-pub mod ground;
-pub mod guidance;
+pub mod foresight;
+pub mod learn;
+pub mod mission;
 pub mod model;
-pub mod mrp;
-pub mod observation;
-pub mod orbit;
 pub mod planner;
-pub mod plant_errors;
+pub mod requests;
 pub mod rng;
-pub mod scenario;
-pub mod strip;
+pub mod task;
 pub mod time;
-pub mod windows;
+pub mod vehicle;
+pub mod world;

@@ -10,13 +10,19 @@ pub type Rng = ChaCha8Rng;
 pub const INITIAL_STATE: u64 = 0;
 /// Stream of the random catalogue.
 pub const CATALOGUE: u64 = 1;
-/// Stream of a planner that draws at random.
-pub const PLANNER: u64 = 2;
-
 /// Stream of the sensors' noise.
 pub const SENSORS: u64 = 3;
 /// Stream of the times at which requests come in flight.
 pub const ARRIVALS: u64 = 4;
+
+/// First of the streams of a planner that draws at random, one for each task; all other streams lie below it.
+const PLANNER: u64 = 1 << 32;
+
+/// Stream of a planner that draws at random, for a task.
+#[must_use]
+pub fn planner(seed: u64, task: u64) -> Rng {
+    stream(seed, PLANNER.saturating_add(task))
+}
 
 /// Stream `number` of a seed.
 #[must_use]
@@ -24,4 +30,20 @@ pub fn stream(seed: u64, number: u64) -> Rng {
     let mut rng = Rng::seed_from_u64(seed);
     rng.set_stream(number);
     rng
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::*;
+
+    #[test]
+    fn no_task_of_a_planner_draws_what_something_else_draws() {
+        let first = |mut rng: Rng| rng.random::<u64>();
+        let fixed = [INITIAL_STATE, CATALOGUE, SENSORS, ARRIVALS].map(|number| first(stream(7, number)));
+        for task in 0..100 {
+            assert!(!fixed.contains(&first(planner(7, task))), "task {task}");
+        }
+    }
 }

@@ -4,13 +4,15 @@
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
-use swath_sim::ground::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
+use swath_sim::foresight::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::{Beam, Planner};
-use swath_sim::scenario::{InitialState, ScenarioConfig};
-use swath_sim::strip::StripRequest;
+use swath_sim::requests::scenario::ScenarioConfig;
+use swath_sim::task::{TaskRecord, Totals};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::world::strip::StripRequest;
 
 const SMALL: GroundSettings = GroundSettings { width: 2, branches: 5, weakness: 0.0 };
 
@@ -26,9 +28,9 @@ fn env(orbits: f64, candidates: usize, seed: u64) -> Env {
 
 fn fly(mut env: Env, planner: &mut dyn Planner) -> (Vec<TaskRecord>, Totals) {
     let (mut records, mut totals) = (Vec::new(), Totals::default());
-    env.run(planner, |record| {
-        records.push(record.clone());
-        totals.add(record);
+    env.run(planner, |settled| {
+        records.push(settled.record.clone());
+        totals.add(settled);
     })
     .unwrap();
     (records, totals)
@@ -116,7 +118,7 @@ fn the_bound_is_exact_where_time_does_not_matter_and_counts_twins_once() {
         priority,
         bidirectional,
     };
-    let mut env = Env::new(model, &initial, Tick(200_000));
+    let mut env = Env::empty(model, &initial, Tick(200_000));
     env.submit(&[request(0.0, 0.5, false), request(10.0, 0.25, true), request(20.0, 1.0, false)]);
     assert!((upper_bound(&env) - 1.75).abs() < 1e-12, "{}", upper_bound(&env));
 }
@@ -127,7 +129,7 @@ fn the_bound_is_the_best_use_of_time_where_strips_compete() {
     let env = env(0.2, 40, 6);
     let mut strips: Vec<(f64, f64)> = Vec::new();
     for id in 1..=env.catalogue().len() as u64 {
-        let entry = env.catalogue().get(swath_sim::strip::StripId(id)).unwrap();
+        let entry = env.catalogue().get(swath_sim::world::strip::StripId(id)).unwrap();
         if entry.windows[0].open < env.horizon() {
             strips.push((entry.strip.priority, f64::from(entry.t_acq)));
         }

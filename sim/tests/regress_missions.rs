@@ -4,12 +4,13 @@
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
-use swath_sim::observation::ObservationSet;
 use swath_sim::planner::{Beam, BeamSearch, Decision, Heuristic, Lookahead, Planner, Random};
+use swath_sim::task::{SettledTask, Totals};
 
-fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<TaskRecord> {
+fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<SettledTask> {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());
     let mut env = Env::episode(model, &EpisodeConfig { orbits: 2.0, ..EpisodeConfig::evaluation() }, seed);
     let mut records = Vec::new();
@@ -56,12 +57,12 @@ fn each_reward_is_paid_once_and_tasks_follow_each_other() {
     let records = fly(&mut Heuristic { t_pre_s: 100.0 }, 3);
     let mut paid = std::collections::BTreeSet::new();
     for pair in records.windows(2) {
-        assert_eq!(pair[0].end, pair[1].start);
+        assert_eq!(pair[0].record.end, pair[1].record.start);
     }
-    for record in &records {
-        assert_eq!(record.success(), record.reward > 0.0);
+    for SettledTask { record, reward } in &records {
+        assert_eq!(record.success(), *reward > 0.0);
         assert!(!record.success() || paid.insert(record.strip), "strip {:?} was paid twice", record.strip);
-        let interrupted = record.end == records.last().unwrap().end;
+        let interrupted = record.end == records.last().unwrap().record.end;
         assert!(interrupted || record.strip.is_none() || record.ticks() == record.t_pre + record.t_acq);
     }
     assert!(paid.len() > 40);
@@ -113,4 +114,19 @@ fn a_beam_without_a_budget_still_decides() {
         totals.add(&record);
     }
     assert!(totals.fulfilled > 60 && totals.failed_attitude == 0, "{totals:?}");
+}
+
+#[test]
+fn the_number_asked_for_is_that_of_the_episode() {
+    // From pole to pole over a day every strip can be reached, so the catalogue has all of them.
+    let mut config = SimConfig::default();
+    config.orbit.inclination_deg = 90.0;
+    let model = Arc::new(Model::new(config).unwrap());
+    let mut episode = EpisodeConfig { orbits: 15.0, ..EpisodeConfig::default() };
+    episode.scenario.count = [100, 140];
+    for seed in 0..3 {
+        let env = Env::episode(model.clone(), &episode, seed);
+        assert_eq!(env.catalogue().len(), episode.scenario.count_of(seed));
+    }
+    assert_ne!(episode.scenario.count_of(0), episode.scenario.count_of(1));
 }

@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, TaskRecord, Totals};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::{Beam, Experience, Heuristic, Lookahead, Planner};
-use swath_sim::plant_errors::PlantErrors;
+use swath_sim::task::{SettledTask, Totals};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::errors::PlantErrors;
 
 fn env(episode: &EpisodeConfig, seed: u64) -> Env {
     Env::episode(Arc::new(Model::new(SimConfig::default()).unwrap()), episode, seed)
@@ -18,7 +19,7 @@ fn two_orbits() -> EpisodeConfig {
     EpisodeConfig { orbits: 2.0, ..EpisodeConfig::evaluation() }
 }
 
-fn fly(errors: &str, planner: &mut dyn Planner, seed: u64) -> (Vec<TaskRecord>, Totals) {
+fn fly(errors: &str, planner: &mut dyn Planner, seed: u64) -> (Vec<SettledTask>, Totals) {
     let mut env = env(&two_orbits(), seed);
     env.differ(&errors.parse().unwrap(), seed).unwrap();
     let (mut records, mut totals) = (Vec::new(), Totals::default());
@@ -69,7 +70,7 @@ fn without_errors_a_learned_margin_stays_at_nothing() {
 fn a_decision_takes_effect_when_its_delay_has_passed() {
     let (records, totals) = fly("delay", &mut Beam::default(), 1);
     for pair in records.windows(2) {
-        assert_eq!(pair[1].start.since(pair[0].end), 2, "one second at 2 Hz");
+        assert_eq!(pair[1].record.start.since(pair[0].record.end), 2, "one second at 2 Hz");
     }
     assert!(totals.success_rate() > 0.99, "{totals:?}");
     let (late, _) = fly("delay", &mut Lookahead::with_margin(0), 1);
@@ -126,7 +127,7 @@ fn requests_come_in_flight_and_never_before_their_time() {
     let mut halfway = 0;
     while !env.truncated() {
         let decision = planner.decide(&env.context()).unwrap();
-        env.step_to_horizon(decision).unwrap();
+        env.fly(decision, env.horizon()).unwrap();
         assert!(env.catalogue().len() >= before);
         before = env.catalogue().len();
         if env.now() < Tick(horizon.0 / 2) {
@@ -144,7 +145,7 @@ fn requests_come_in_flight_and_never_before_their_time() {
 fn the_first_requests_are_the_same_whether_others_come_or_not() {
     let (all, some) = (env(&two_orbits(), 8), env(&EpisodeConfig { arrivals: 0.3, ..two_orbits() }, 8));
     for id in 1..=some.catalogue().len() as u64 {
-        let strip = |env: &Env| env.catalogue().get(swath_sim::strip::StripId(id)).unwrap().strip;
+        let strip = |env: &Env| env.catalogue().get(swath_sim::world::strip::StripId(id)).unwrap().strip;
         assert_eq!(strip(&all), strip(&some));
     }
     assert!(EpisodeConfig { arrivals: 1.5, ..two_orbits() }.validate().is_err());

@@ -5,8 +5,8 @@
 use approx::assert_relative_eq;
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use swath_sim::guidance::reference_dcm;
-use swath_sim::mrp;
+use swath_sim::vehicle::mrp;
+use swath_sim::world::frames::reference_dcm;
 
 /// Eqs 2-10, step by step, starting from the body's attitude; `dcm_R2N`.
 fn two_steps(

@@ -5,9 +5,10 @@
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, Totals};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::Heuristic;
+use swath_sim::task::Totals;
 
 const MISSIONS: u64 = 60;
 

@@ -1,17 +1,19 @@
-//! Measures training, rollouts and single decisions of the compact HOP-PPO; prints one JSON object.
+//! Measures training, rollouts and single decisions of the compact HOP-PPO; prints one JSON object, whose `training`
+//! says of what.
 
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use swath_sim::env::{Env, EpisodeConfig};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::Planner;
 use swath_training::checkpoint;
 use swath_training::config::{EnvironmentConfig, RunConfig};
 use swath_training::policy::{LearnedPlanner, Policy};
 use swath_training::process;
+use swath_training::program::Program;
 use swath_training::trainer::Trainer;
 use tch::Device;
 
@@ -36,18 +38,19 @@ fn main() -> Result<()> {
     let began = Instant::now();
     let update = trainer.learn(&segments)?;
     let train_s = began.elapsed().as_secs_f64();
-    let (p50, p99) = decision_ms(&trainer, &run)?;
+    let (policy, p50, p99) = decision_ms(&trainer, &run)?;
     let measured = serde_json::json!({
         "train_samples_per_s": (decisions as f64 * update.epochs / train_s).round(),
         "rollout_steps_per_s": (decisions as f64 / rollout_s).round(),
         "decision_p50_ms": p50,
         "decision_p99_ms": p99,
+        "training": { "program": Program::THIS, "configuration": run, "policies": [{ "sha256": policy }] },
     });
     writeln!(std::io::stdout(), "{measured}").context("cannot print the measurements")
 }
 
-/// Median and 99th percentile of a decision with its observation, one at a time [ms].
-fn decision_ms(trainer: &Trainer, run: &RunConfig) -> Result<(f64, f64)> {
+/// Digest of the policy, median and 99th percentile of a decision with its observation, one at a time [ms].
+fn decision_ms(trainer: &Trainer, run: &RunConfig) -> Result<(String, f64, f64)> {
     let EnvironmentConfig::Strips(strips) = &run.environment else {
         anyhow::bail!("the compact run is not about strips");
     };
@@ -67,5 +70,5 @@ fn decision_ms(trainer: &Trainer, run: &RunConfig) -> Result<(f64, f64)> {
         }
     }
     times.sort_by(f64::total_cmp);
-    Ok((times[DECISIONS / 2], times[DECISIONS * 99 / 100]))
+    Ok((planner.policy().digest().to_owned(), times[DECISIONS / 2], times[DECISIONS * 99 / 100]))
 }

@@ -21,8 +21,9 @@ pub struct Adam {
 
 impl Adam {
     /// A fresh state for `count` weights.
-    pub fn new(count: usize, device: Device) -> Adam {
-        Adam {
+    #[must_use]
+    pub fn new(count: usize, device: Device) -> Self {
+        Self {
             first: Tensor::zeros([count as i64], (Kind::Float, device)),
             second: Tensor::zeros([count as i64], (Kind::Float, device)),
             steps: 0,

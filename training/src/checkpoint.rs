@@ -14,7 +14,7 @@ use crate::error::{Result, TrainingError};
 use crate::parameters::Layout;
 use crate::rollout::SlotState;
 use crate::store::{self, Content};
-use crate::trainer::{Trainer, TrainerState};
+use crate::trainer::{LessonsState, Trainer, TrainerState};
 
 /// The program's revision in version control.
 pub const REVISION: &str = env!("SWATH_REVISION");
@@ -36,41 +36,46 @@ pub struct Header {
     pub adam_steps: u64,
     /// Bits of the KL penalty's weight.
     pub kl_coefficient_bits: u64,
+    /// Decisions that a warm start has shown, while it is not over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lessons_shown: Option<u64>,
 }
 
-/// Version of the files that this program reads and writes.
+/// Version of files as they are written.
 const VERSION: u32 = 1;
+/// Version of checkpoints within a warm start, which programs that know version 1 alone would take for its end.
+const VERSION_LESSONS: u32 = 2;
 /// Bytes of a stored generator: seed, stream, position.
 const RNG_BYTES: usize = 32 + 8 + 16;
+/// What a file of weights alone calls itself.
+const POLICY: &str = "policy";
+/// Names of the tensors that hold the environments, and those that a teacher leads.
+const ENVIRONMENTS: &str = "environments";
+const LESSONS: &str = "lessons";
 
 /// Writes everything that is needed to go on with the run.
+///
+/// # Errors
+/// A file that cannot be written.
 pub fn save(trainer: &Trainer, path: &Path) -> Result<()> {
-    let state = trainer.state()?;
+    let state = trainer.present()?;
     let mut content = weights(trainer, &state, "checkpoint")?;
     content.insert("adam.first", &[state.first.len()], &state.first);
     content.insert("adam.second", &[state.second.len()], &state.second);
     content.insert("learner.rng", &[RNG_BYTES], &rng_bytes(&state.rng));
-    let slots = &state.slots;
-    let rngs: Vec<u8> = slots.iter().flat_map(|slot| rng_bytes(&slot.rng)).collect();
-    let seeds: Vec<u64> = slots.iter().map(|slot| slot.seed).collect();
-    let lengths: Vec<u64> = slots.iter().map(|slot| slot.actions.len() as u64).collect();
-    let actions = || slots.iter().flat_map(|slot| &slot.actions);
-    // No episode is cut off after 0 decisions: 0 stands for none.
-    let limits: Vec<u64> = slots.iter().map(|slot| slot.limit.unwrap_or(0)).collect();
-    let tokens: Vec<u64> = actions().map(|action| action.token as u64).collect();
-    let parameters: Vec<f64> = actions().map(|action| action.parameter).collect();
-    content.insert("environments.rng", &[slots.len(), RNG_BYTES], &rngs);
-    content.insert("environments.seed", &[slots.len()], &seeds);
-    content.insert("environments.length", &[slots.len()], &lengths);
-    content.insert("environments.limit", &[slots.len()], &limits);
-    content.insert("environments.token", &[tokens.len()], &tokens);
-    content.insert("environments.parameter", &[parameters.len()], &parameters);
+    insert_slots(&mut content, ENVIRONMENTS, &state.slots);
+    if let Some(lessons) = &state.lessons {
+        insert_slots(&mut content, LESSONS, &lessons.slots);
+    }
     store::write_atomically(path, &content.to_bytes()?)
 }
 
 /// Writes the weights alone: a policy to fly.
+///
+/// # Errors
+/// A file that cannot be written.
 pub fn save_policy(trainer: &Trainer, path: &Path) -> Result<()> {
-    let content = weights(trainer, &trainer.state()?, "policy")?;
+    let content = weights(trainer, trainer.present()?.as_ref(), POLICY)?;
     store::write_atomically(path, &content.to_bytes()?)
 }
 
@@ -82,9 +87,10 @@ pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerStat
     let content = Content::read(path)?;
     let header = header(&content, path)?;
     if header.content != "checkpoint" {
-        return Err(TrainingError::damaged(path, format!("it is a {}", header.content)));
+        return Err(TrainingError::unsuitable(path, format!("it is a {}, not a checkpoint", header.content)));
     }
     check_same_run(&header.run, run, path)?;
+    let lessons = |shown| slots(&content, LESSONS, path).map(|slots| LessonsState { shown, slots });
     let state = TrainerState {
         weights: flat_weights(&content, layout, path)?,
         first: content.numbers("adam.first", path)?,
@@ -93,17 +99,22 @@ pub fn load(path: &Path, run: &RunConfig, layout: &Layout) -> Result<TrainerStat
         kl_coefficient: f64::from_bits(header.kl_coefficient_bits),
         steps: header.steps,
         rng: rng_from(&content.numbers("learner.rng", path)?, path)?,
-        slots: slots(&content, path)?,
+        slots: slots(&content, ENVIRONMENTS, path)?,
+        lessons: header.lessons_shown.map(lessons).transpose()?,
     };
-    let sizes = [
+    let environments = run.rollout.environments;
+    let mut sizes = vec![
         ("adam.first", state.first.len(), layout.count()),
         ("adam.second", state.second.len(), layout.count()),
-        ("environments.rng", state.slots.len(), run.rollout.environments),
+        ("environments.rng", state.slots.len(), environments),
     ];
+    // Before the first lesson there are no environments for it.
+    let taught = state.lessons.as_ref().map(|it| it.slots.len()).filter(|&count| count > 0);
+    sizes.extend(taught.map(|count| ("lessons.rng", count, environments)));
     for (name, found, wanted) in sizes {
         if found != wanted {
             let reason = format!("{name} has {found} entries instead of {wanted}");
-            return Err(TrainingError::damaged(path, reason));
+            return Err(TrainingError::unsuitable(path, reason));
         }
     }
     Ok(state)
@@ -122,16 +133,25 @@ pub fn load_weights(path: &Path, run: &RunConfig, layout: &Layout) -> Result<Vec
 }
 
 /// The header of a checkpoint or policy.
+///
+/// # Errors
+/// A file of another version.
 pub fn header(content: &Content, path: &Path) -> Result<Header> {
-    let header: Header = serde_json::from_str(&content.header).map_err(|error| TrainingError::damaged(path, error))?;
-    if header.version != VERSION {
-        let reason = format!("its version is {}, not {VERSION}", header.version);
-        return Err(TrainingError::damaged(path, reason));
+    // The digest was right, so whatever is wrong was written so: it is another version's, not damaged.
+    let header: Header = serde_json::from_str(&content.header).map_err(|error| {
+        TrainingError::unsuitable(path, format!("another version of swath-train wrote it: {error}"))
+    })?;
+    if ![VERSION, VERSION_LESSONS].contains(&header.version) {
+        let reason = format!("its version is {}, this program reads {VERSION} and {VERSION_LESSONS}", header.version);
+        return Err(TrainingError::unsuitable(path, reason));
     }
     Ok(header)
 }
 
 /// The weights of a file as one vector in the layout's order.
+///
+/// # Errors
+/// A tensor that is missing or has another size.
 pub fn flat_weights(content: &Content, layout: &Layout, path: &Path) -> Result<Vec<f32>> {
     let mut flat = Vec::with_capacity(layout.count());
     for (name, shape) in layout.entries() {
@@ -139,7 +159,7 @@ pub fn flat_weights(content: &Content, layout: &Layout, path: &Path) -> Result<V
         let wanted = shape.iter().product::<i64>() as usize;
         if numbers.len() != wanted {
             let reason = format!("{name} has {} numbers instead of {wanted}", numbers.len());
-            return Err(TrainingError::damaged(path, reason));
+            return Err(TrainingError::unsuitable(path, reason));
         }
         flat.extend(numbers);
     }
@@ -156,6 +176,9 @@ pub fn newest(folder: &Path) -> Result<PathBuf> {
 }
 
 /// The checkpoints of a folder, oldest first; none when the folder is not there.
+///
+/// # Errors
+/// A folder that cannot be read.
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let entries = match std::fs::read_dir(folder) {
@@ -165,7 +188,8 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in entries {
         let path = entry.map_err(TrainingError::file("read", folder))?.path();
         let name = path.file_name().and_then(|name| name.to_str());
-        if name.is_some_and(|name| name.starts_with("step-") && name.ends_with(".safetensors")) {
+        let ours = |name: &str| name.starts_with("step-") || name.starts_with("lesson-");
+        if name.is_some_and(|name| ours(name) && name.ends_with(".safetensors")) {
             found.push(path);
         }
     }
@@ -173,20 +197,26 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// The name of the checkpoint after some steps; names sort by steps.
-pub fn file_name(steps: u64) -> String {
-    format!("step-{steps:012}.safetensors")
+/// The name of a trainer's checkpoint. Names sort by progress: those within a warm start come before the others.
+#[must_use]
+pub fn file_name(trainer: &Trainer) -> String {
+    match trainer.lessons_shown() {
+        Some(shown) => format!("lesson-{shown:012}.safetensors"),
+        None => format!("step-{:012}.safetensors", trainer.steps()),
+    }
 }
 
 fn weights(trainer: &Trainer, state: &TrainerState, content: &str) -> Result<Content> {
+    let lessons_shown = state.lessons.as_ref().filter(|_| content != POLICY).map(|it| it.shown);
     let header = Header {
         content: content.into(),
-        version: VERSION,
+        version: if lessons_shown.is_some() { VERSION_LESSONS } else { VERSION },
         run: trainer.run().clone(),
         steps: state.steps,
         revision: REVISION.into(),
         adam_steps: state.adam_steps,
         kl_coefficient_bits: state.kl_coefficient.to_bits(),
+        lessons_shown,
     };
     let mut content = Content { header: store::json(&header)?, tensors: BTreeMap::new() };
     let mut offset = 0;
@@ -199,21 +229,39 @@ fn weights(trainer: &Trainer, state: &TrainerState, content: &str) -> Result<Con
     Ok(content)
 }
 
-fn slots(content: &Content, path: &Path) -> Result<Vec<SlotState>> {
-    let rngs: Vec<u8> = content.numbers("environments.rng", path)?;
-    let seeds: Vec<u64> = content.numbers("environments.seed", path)?;
-    let lengths: Vec<u64> = content.numbers("environments.length", path)?;
-    let limits: Vec<u64> = content.numbers("environments.limit", path)?;
-    let tokens: Vec<u64> = content.numbers("environments.token", path)?;
-    let parameters: Vec<f64> = content.numbers("environments.parameter", path)?;
+fn insert_slots(content: &mut Content, group: &str, slots: &[SlotState]) {
+    let name = |part: &str| format!("{group}.{part}");
+    let rngs: Vec<u8> = slots.iter().flat_map(|slot| rng_bytes(&slot.rng)).collect();
+    let seeds: Vec<u64> = slots.iter().map(|slot| slot.seed).collect();
+    let lengths: Vec<u64> = slots.iter().map(|slot| slot.actions.len() as u64).collect();
+    let actions = || slots.iter().flat_map(|slot| &slot.actions);
+    // No episode is cut off after 0 decisions: 0 stands for none.
+    let limits: Vec<u64> = slots.iter().map(|slot| slot.limit.unwrap_or(0)).collect();
+    let tokens: Vec<u64> = actions().map(|action| action.token as u64).collect();
+    let parameters: Vec<f64> = actions().map(|action| action.parameter).collect();
+    content.insert(&name("rng"), &[slots.len(), RNG_BYTES], &rngs);
+    content.insert(&name("seed"), &[slots.len()], &seeds);
+    content.insert(&name("length"), &[slots.len()], &lengths);
+    content.insert(&name("limit"), &[slots.len()], &limits);
+    content.insert(&name("token"), &[tokens.len()], &tokens);
+    content.insert(&name("parameter"), &[parameters.len()], &parameters);
+}
+
+fn slots(content: &Content, group: &str, path: &Path) -> Result<Vec<SlotState>> {
+    let name = |part: &str| format!("{group}.{part}");
+    let rngs: Vec<u8> = content.numbers(&name("rng"), path)?;
+    let seeds: Vec<u64> = content.numbers(&name("seed"), path)?;
+    let lengths: Vec<u64> = content.numbers(&name("length"), path)?;
+    let limits: Vec<u64> = content.numbers(&name("limit"), path)?;
+    let tokens: Vec<u64> = content.numbers(&name("token"), path)?;
+    let parameters: Vec<f64> = content.numbers(&name("parameter"), path)?;
     let consistent = rngs.len() == seeds.len() * RNG_BYTES
         && lengths.len() == seeds.len()
         && limits.len() == seeds.len()
         && lengths.iter().sum::<u64>() == tokens.len() as u64
         && tokens.len() == parameters.len();
     if !consistent {
-        let reason = "its environments' tensors do not fit each other";
-        return Err(TrainingError::damaged(path, reason));
+        return Err(TrainingError::unsuitable(path, format!("its tensors {group} do not fit each other")));
     }
     let mut actions =
         tokens.iter().zip(&parameters).map(|(&token, &parameter)| Action { token: token as usize, parameter });
@@ -243,7 +291,7 @@ fn rng_from(bytes: &[u8], path: &Path) -> Result<ChaCha8Rng> {
     let stream = part(32, 40).and_then(|it| <[u8; 8]>::try_from(it).ok());
     let position = part(40, RNG_BYTES).and_then(|it| <[u8; 16]>::try_from(it).ok());
     let (Some(seed), Some(stream), Some(position)) = (seed, stream, position) else {
-        return Err(TrainingError::damaged(path, "a generator's state is cut short"));
+        return Err(TrainingError::unsuitable(path, "a generator's state is cut short"));
     };
     let mut rng = ChaCha8Rng::from_seed(seed);
     rng.set_stream(u64::from_le_bytes(stream));
@@ -256,14 +304,11 @@ const MAY_DIFFER: [&str; 3] = ["name", "steps", "checkpoint_every"];
 
 fn check_same_run(found: &RunConfig, wanted: &RunConfig, path: &Path) -> Result<()> {
     let (found, wanted) = (settings(found)?, settings(wanted)?);
-    let keys = found.keys().chain(wanted.keys());
-    let Some(key) = keys.min_by_key(|key| (found.get(*key) == wanted.get(*key), *key)) else {
+    let keys = found.keys().chain(wanted.keys()).filter(|key| !MAY_DIFFER.contains(&key.as_str()));
+    let Some(key) = keys.filter(|key| found.get(*key) != wanted.get(*key)).min() else {
         return Ok(());
     };
-    if found.get(key) == wanted.get(key) {
-        return Ok(());
-    }
-    let shown = |entries: &BTreeMap<String, String>| entries.get(key).cloned().unwrap_or_else(|| "absent".into());
+    let shown = |entries: &BTreeMap<String, Value>| entries.get(key).map_or_else(|| "absent".into(), Value::to_string);
     Err(TrainingError::Mismatch {
         path: path.to_path_buf(),
         key: key.clone(),
@@ -272,16 +317,18 @@ fn check_same_run(found: &RunConfig, wanted: &RunConfig, path: &Path) -> Result<
     })
 }
 
-/// Dotted keys and values of a run, less what may differ.
-fn settings(run: &RunConfig) -> Result<BTreeMap<String, String>> {
-    let value = serde_json::to_value(run).map_err(|error| TrainingError::Environment(error.to_string()))?;
+/// Dotted keys and values of a configuration; what is absent in it is absent here.
+///
+/// # Errors
+/// A configuration that JSON cannot hold.
+pub(crate) fn settings(configuration: &impl Serialize) -> Result<BTreeMap<String, Value>> {
+    let value = serde_json::to_value(configuration).map_err(TrainingError::environment)?;
     let mut entries = BTreeMap::new();
-    flatten("", &value, &mut entries);
-    entries.retain(|key, _| !MAY_DIFFER.contains(&key.as_str()));
+    flatten("", value, &mut entries);
     Ok(entries)
 }
 
-fn flatten(prefix: &str, value: &Value, entries: &mut BTreeMap<String, String>) {
+fn flatten(prefix: &str, value: Value, entries: &mut BTreeMap<String, Value>) {
     match value {
         Value::Object(map) => {
             for (key, value) in map {
@@ -291,7 +338,7 @@ fn flatten(prefix: &str, value: &Value, entries: &mut BTreeMap<String, String>) 
         }
         Value::Null => {}
         value => {
-            entries.insert(prefix.to_owned(), value.to_string());
+            entries.insert(prefix.to_owned(), value);
         }
     }
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
-use swath_sim::env::EpisodeConfig;
-use swath_sim::observation::ObservationSet;
+use swath_sim::learn::episode::EpisodeConfig;
+use swath_sim::learn::observation::ObservationSet;
 use swath_sim::planner::PlannerSpec;
 
 use crate::error::{Result, TrainingError};
@@ -88,13 +88,14 @@ pub struct RolloutConfig {
 }
 
 impl Default for RolloutConfig {
-    fn default() -> RolloutConfig {
-        RolloutConfig { environments: 64, group: 32, stagger: 0 }
+    fn default() -> Self {
+        Self { environments: 64, group: 32, stagger: 0 }
     }
 }
 
-/// Hyperparameters of PPO. Defaults are Table 3's, and RLlib 2.6.3's where the paper is silent,
-/// except for the value clamp and the KL penalty, which are off.
+/// Hyperparameters of PPO. Defaults are Table 3's, and RLlib 2.6.3's where the paper is silent, with these exceptions:
+/// `clip` and `gradient_norm` are as in RLlib's examples, 0.2 and 0.5, which Table 3 prints the other way round; the
+/// value clamp and the KL penalty are off. `docs/paper-comparison.md` sets all of it side by side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PpoConfig {
@@ -143,8 +144,8 @@ pub struct KlPenalty {
 }
 
 impl Default for PpoConfig {
-    fn default() -> PpoConfig {
-        PpoConfig {
+    fn default() -> Self {
+        Self {
             batch: 3000,
             minibatch: 128,
             epochs: 10,
@@ -187,9 +188,9 @@ impl RunConfig {
     ///
     /// # Errors
     /// An unreadable file, an unknown key, or a value out of range.
-    pub fn load(path: &Path) -> Result<RunConfig> {
+    pub fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(TrainingError::file("read", path))?;
-        let run: RunConfig = toml::from_str(&text)
+        let run: Self = toml::from_str(&text)
             .map_err(|source| TrainingError::Toml { path: path.to_path_buf(), source: Box::new(source) })?;
         run.validate()?;
         Ok(run)
@@ -197,10 +198,17 @@ impl RunConfig {
 
     /// Checks every number that has a range; NaN is in none. Network sizes are checked where the
     /// network is built.
+    ///
+    /// # Errors
+    /// The first setting that is out of range.
     pub fn validate(&self) -> Result<()> {
         let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         if self.name.is_empty() || self.name.starts_with('.') || !self.name.chars().all(plain) {
             return Err(setting("name", &self.name, "letters, digits, '-', '_' and '.'"));
+        }
+        // A run is kept as TOML, which has no greater number.
+        if i64::try_from(self.seed).is_err() {
+            return Err(setting("seed", self.seed, &format!("in 0 to {}", i64::MAX)));
         }
         between("steps", self.steps as f64, 1.0, 1e12)?;
         between("checkpoint_every", self.checkpoint_every as f64, 1.0, 1e12)?;
@@ -214,6 +222,7 @@ impl RunConfig {
     }
 
     /// Steps that every environment takes for a batch.
+    #[must_use]
     pub fn steps_per_environment(&self) -> usize {
         self.ppo.batch.div_ceil(self.rollout.environments)
     }
@@ -222,15 +231,10 @@ impl RunConfig {
 impl EnvironmentConfig {
     fn validate(&self) -> Result<()> {
         match self {
-            EnvironmentConfig::Toy(toy) => between("environment.tokens", toy.tokens as f64, 2.0, 1000.0),
-            EnvironmentConfig::Strips(strips) => {
-                let sim = |error: swath_sim::error::SimError| TrainingError::Setting {
-                    key: "environment".into(),
-                    value: "not valid".into(),
-                    limit: format!("usable: {error}"),
-                };
-                strips.simulation.validate().map_err(sim)?;
-                strips.episode.validate().map_err(sim)
+            Self::Toy(toy) => between("environment.tokens", toy.tokens as f64, 2.0, 1000.0),
+            Self::Strips(strips) => {
+                strips.simulation.validate()?;
+                Ok(strips.episode.validate()?)
             }
         }
     }
@@ -240,6 +244,7 @@ impl RolloutConfig {
     fn validate(&self) -> Result<()> {
         between("rollout.environments", self.environments as f64, 1.0, 65536.0)?;
         between("rollout.group", self.group as f64, 1.0, self.environments as f64)?;
+        between("rollout.stagger", self.stagger as f64, 0.0, 1e9)?;
         if !self.environments.is_multiple_of(self.group) {
             let limit = format!("a divisor of rollout.environments, {}", self.environments);
             return Err(setting("rollout.group", self.group, &limit));

@@ -44,8 +44,9 @@ pub struct SquashedGaussian {
 
 impl SquashedGaussian {
     /// From a network's two outputs, [batch, 2]; the second is kept within bounds.
-    pub fn from_outputs(outputs: &Tensor) -> SquashedGaussian {
-        SquashedGaussian {
+    #[must_use]
+    pub fn from_outputs(outputs: &Tensor) -> Self {
+        Self {
             mean: outputs.select(-1, 0),
             log_deviation: outputs.select(-1, 1).clamp(LOG_DEVIATION.0, LOG_DEVIATION.1),
         }
@@ -67,7 +68,7 @@ impl SquashedGaussian {
     }
 
     /// KL(self ‖ new), [batch]; squashing does not change it.
-    pub fn kl(&self, new: &SquashedGaussian) -> Tensor {
+    pub fn kl(&self, new: &Self) -> Tensor {
         let variance = (&self.log_deviation * 2.0).exp();
         let distance = (&self.mean - &new.mean).square();
         let scaled = (variance + distance) * (&new.log_deviation * -2.0).exp() * 0.5;
@@ -76,11 +77,13 @@ impl SquashedGaussian {
 }
 
 /// The parameter of a latent, u = (1 + tanh x)/2.
+#[must_use]
 pub fn squash(latent: f32) -> f64 {
     0.5 * (1.0 + f64::from(latent).tanh())
 }
 
 /// The latent of a parameter, kept away from the ends where it would be infinite.
+#[must_use]
 pub fn unsquash(parameter: f64) -> f32 {
     let bounded = parameter.clamp(1e-4, 1.0 - 1e-4);
     (2.0 * bounded - 1.0).atanh() as f32
@@ -107,6 +110,7 @@ pub fn sample_choice(logits: &[f32], rng: &mut impl Rng) -> usize {
 }
 
 /// The index of the greatest logit, the first of equals.
+#[must_use]
 pub fn best_choice(logits: &[f32]) -> usize {
     let mut best = 0;
     for (index, &logit) in logits.iter().enumerate() {

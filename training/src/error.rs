@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use swath_sim::error::SimError;
+
 /// The error of this crate.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainingError {
@@ -35,7 +37,7 @@ pub enum TrainingError {
         /// What is allowed.
         limit: String,
     },
-    /// A checkpoint or policy file is damaged.
+    /// A checkpoint or policy file is not what was once written.
     #[error("{path} is damaged: {reason}")]
     Damaged {
         /// The file.
@@ -43,6 +45,30 @@ pub enum TrainingError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A file is whole, but not what is needed.
+    #[error("{path} cannot be used here: {reason}")]
+    Unsuitable {
+        /// The file.
+        path: PathBuf,
+        /// What it is instead.
+        reason: String,
+    },
+    /// Another process writes into the run's folder.
+    #[error(
+        "{path} belongs to a run that is going on, process {process}: wait for it, or choose another --out or --seed"
+    )]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+        /// The process that holds it.
+        process: String,
+    },
+    /// What was asked for has no answer.
+    #[error("there is no result: {0}")]
+    NoResult(String),
+    /// Somebody asked to stop; [`Trainer::state`](crate::trainer::Trainer::state) is that before the update.
+    #[error("stopped before the update was complete")]
+    Stopped,
     /// A checkpoint belongs to another run.
     #[error("{path} was made by another run: {key} is {found} there and {wanted} here")]
     Mismatch {
@@ -92,6 +118,9 @@ pub enum TrainingError {
     /// libtorch refused an operation.
     #[error("libtorch failed")]
     Torch(#[from] tch::TchError),
+    /// A setting of the simulation is out of range.
+    #[error(transparent)]
+    Simulation(#[from] SimError),
     /// The simulated environment could not be made or stepped.
     #[error("the environment failed: {0}")]
     Environment(String),
@@ -102,12 +131,21 @@ pub type Result<T> = std::result::Result<T, TrainingError>;
 
 impl TrainingError {
     /// For `map_err` on an I/O result.
-    pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> TrainingError {
+    pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_path_buf();
-        move |source| TrainingError::File { action, path, source }
+        move |source| Self::File { action, path, source }
     }
 
-    pub(crate) fn damaged(path: &Path, reason: impl ToString) -> TrainingError {
-        TrainingError::Damaged { path: path.to_path_buf(), reason: reason.to_string() }
+    pub(crate) fn damaged(path: &Path, reason: impl ToString) -> Self {
+        Self::Damaged { path: path.to_path_buf(), reason: reason.to_string() }
+    }
+
+    pub(crate) fn unsuitable(path: &Path, reason: impl ToString) -> Self {
+        Self::Unsuitable { path: path.to_path_buf(), reason: reason.to_string() }
+    }
+
+    /// For `map_err` on what goes wrong while the simulation flies.
+    pub(crate) fn environment(error: impl ToString) -> Self {
+        Self::Environment(error.to_string())
     }
 }

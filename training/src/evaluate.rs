@@ -5,13 +5,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, Totals};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
-use swath_sim::planner::{Planner, PlannerSpec};
-use swath_sim::plant_errors::PlantErrors;
+use swath_sim::planner::Planner;
+use swath_sim::task::Totals;
+use swath_sim::vehicle::errors::PlantErrors;
 
 use crate::error::{Result, TrainingError};
-use crate::planners;
+use crate::planners::Prepared;
 
 /// Which missions to fly.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,33 +29,35 @@ pub struct Missions {
     pub count: u64,
 }
 
-/// One mission flown.
+/// One mission flown. What no attempt, or no image, tells is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mission {
     /// Its seed.
     pub seed: u64,
-    /// Strips asked for by its end, without those that could not be flown.
+    /// Strips asked for.
     pub requests: usize,
+    /// Those of them that have a window in which they can be imaged, up to 1.5 orbits past the mission's end.
+    pub reachable: usize,
     /// Sum of the priorities of imaged strips, per orbit.
     pub reward_per_orbit: f64,
     /// Share of the attempts that succeeded.
-    pub success_rate: f64,
+    pub success_rate: Option<f64>,
     /// Attempts per orbit.
     pub attempts_per_orbit: f64,
     /// Strips imaged per orbit.
     pub imaged_per_orbit: f64,
     /// Mean transition time of attempts [s].
-    pub t_pre_s: f64,
+    pub t_pre_s: Option<f64>,
     /// Mean acquisition time of attempts [s].
-    pub t_acq_s: f64,
+    pub t_acq_s: Option<f64>,
     /// Mean priority of imaged strips.
-    pub priority: f64,
+    pub priority: Option<f64>,
     /// Time spent waiting, per orbit [s].
     pub wait_s_per_orbit: f64,
     /// Share of the attempts that failed for attitude.
-    pub failed_attitude: f64,
+    pub failed_attitude: Option<f64>,
     /// Share of the attempts that failed for elevation.
-    pub failed_elevation: f64,
+    pub failed_elevation: Option<f64>,
 }
 
 /// A mean over missions.
@@ -62,102 +65,210 @@ pub struct Mission {
 pub struct Spread {
     /// Mean.
     pub mean: f64,
-    /// Standard deviation over missions.
-    pub deviation: f64,
-    /// Half the width of the mean's 95 % confidence interval.
-    pub confidence_95: f64,
+    /// Standard deviation over missions; one mission has none.
+    pub deviation: Option<f64>,
+    /// Half the width of the mean's 95 % confidence interval; one mission has none.
+    pub confidence_95: Option<f64>,
 }
 
-/// Flies every mission with every planner; results are by planner, then by seed.
+impl Missions {
+    /// The seeds of the missions.
+    ///
+    /// # Errors
+    /// No mission, or seeds that run beyond the greatest one.
+    pub fn seeds(&self) -> Result<impl IndexedParallelIterator<Item = u64> + use<>> {
+        let refused = |value: u64, limit: String| TrainingError::Setting {
+            key: "seed of the first mission".into(),
+            value: value.to_string(),
+            limit,
+        };
+        let after =
+            self.count.checked_sub(1).ok_or_else(|| TrainingError::NoResult("no mission is asked for".into()))?;
+        if self.first_seed.checked_add(after).is_none() {
+            let limit =
+                format!("at most {}: the seeds of all {} missions follow each other", u64::MAX - after, self.count);
+            return Err(refused(self.first_seed, limit));
+        }
+        let first = self.first_seed;
+        let count = usize::try_from(self.count).map_err(|_| refused(self.count, "a number of missions".into()))?;
+        Ok((0..count).into_par_iter().map(move |index| first + index as u64))
+    }
+}
+
+/// Flies every mission with every planner; results are by planner, then by seed. `each` is called after every mission.
+///
+/// ```
+/// use swath_sim::learn::episode::EpisodeConfig;
+/// use swath_training::evaluate::{Missions, fly, spread};
+/// use swath_training::planners::Prepared;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let missions = Missions {
+///     simulation: Default::default(),
+///     episode: EpisodeConfig { orbits: 0.5, ..EpisodeConfig::evaluation() },
+///     plant: Default::default(),
+///     first_seed: 7,
+///     count: 2,
+/// };
+/// let planners = [Prepared::new(&"heuristic:80".parse()?)?, Prepared::new(&"hop-ppo".parse()?)?];
+/// let flown = fly(&missions, &planners, || {})?;
+/// let reward = |planner: usize| spread(&flown[planner], |mission| Some(mission.reward_per_orbit));
+/// assert!(reward(0).zip(reward(1)).is_some_and(|(fixed, learned)| learned.mean > fixed.mean));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// A planner that cannot be made or fails; settings out of range.
-pub fn fly(missions: &Missions, planners: &[PlannerSpec]) -> Result<Vec<Vec<Mission>>> {
-    let failed = |error: swath_sim::error::SimError| TrainingError::Environment(error.to_string());
-    missions.episode.validate().map_err(failed)?;
-    let model = Arc::new(Model::new(missions.simulation.clone()).map_err(failed)?);
-    let seeds = missions.first_seed..missions.first_seed + missions.count;
-    let by_seed: Vec<Vec<Mission>> = seeds
-        .into_par_iter()
+/// A planner that fails; settings out of range; missions in which no planner attempts anything.
+pub fn fly(missions: &Missions, planners: &[Prepared], each: impl Fn() + Sync) -> Result<Vec<Vec<Mission>>> {
+    missions.episode.validate()?;
+    let model = Arc::new(Model::new(missions.simulation.clone())?);
+    let by_seed: Vec<Vec<Mission>> = missions
+        .seeds()?
         .map(|seed| {
             // One catalogue serves all planners: its windows take longer than flying.
             let mut env = Env::episode(model.clone(), &missions.episode, seed);
-            env.differ(&missions.plant, seed).map_err(failed)?;
-            let flown = planners.iter().map(|spec| {
-                let mut planner = planners::make(spec, seed)?;
-                mission(env.clone(), planner.as_mut(), seed, missions.episode.orbits)
+            env.differ(&missions.plant, seed)?;
+            let flown = planners.iter().map(|planner| {
+                let mut planner = planner.make(seed)?;
+                mission(env.clone(), planner.as_mut(), &missions.episode, seed)
             });
-            flown.collect::<Result<Vec<Mission>>>()
+            let flown = flown.collect::<Result<Vec<Mission>>>();
+            each();
+            flown
         })
         .collect::<Result<_>>()?;
+    attempted(by_seed.iter().flatten())?;
     let of = |index: usize| by_seed.iter().map(|row| row[index]).collect();
     Ok((0..planners.len()).map(of).collect())
 }
 
-/// Flies one mission to its end and adds up.
+/// Refuses missions that tell nothing because nothing was attempted in any of them.
+///
+/// # Errors
+/// [`TrainingError::NoResult`].
+pub fn attempted<'a>(missions: impl Iterator<Item = &'a Mission> + Clone) -> Result<()> {
+    if missions.clone().any(|it| it.attempts_per_orbit > 0.0) {
+        return Ok(());
+    }
+    let most = |quantity: fn(&Mission) -> usize| missions.clone().map(quantity).max().unwrap_or(0);
+    let (requests, reachable) = (most(|it| it.requests), most(|it| it.reachable));
+    Err(TrainingError::NoResult(format!(
+        "nothing was attempted in any mission: at most {requests} strips were asked for and {reachable} reachable"
+    )))
+}
+
+/// Flies one mission of a seed to its end and adds up.
 ///
 /// # Errors
 /// When the planner fails.
-pub fn mission(mut env: Env, planner: &mut dyn Planner, seed: u64, orbits: f64) -> Result<Mission> {
-    let period = env.model().period;
+pub fn mission(mut env: Env, planner: &mut dyn Planner, episode: &EpisodeConfig, seed: u64) -> Result<Mission> {
+    let (period, orbits) = (env.model().period, episode.orbits);
     let mut totals = Totals::default();
-    env.run(planner, |record| totals.add(record)).map_err(|error| TrainingError::Environment(error.to_string()))?;
-    let attempts = totals.attempts as f64;
+    env.run(planner, |record| totals.add(record)).map_err(TrainingError::environment)?;
     let seconds = |ticks: u64| ticks as f64 * period.seconds();
+    let of_attempts = |sum: f64| (totals.attempts > 0).then(|| sum / totals.attempts as f64);
     Ok(Mission {
         seed,
-        requests: env.catalogue().len(),
+        requests: episode.scenario.count_of(seed),
+        reachable: env.catalogue().len(),
         reward_per_orbit: totals.reward / orbits,
-        success_rate: totals.success_rate(),
-        attempts_per_orbit: attempts / orbits,
+        success_rate: of_attempts(totals.fulfilled as f64),
+        attempts_per_orbit: totals.attempts as f64 / orbits,
         imaged_per_orbit: totals.fulfilled as f64 / orbits,
-        t_pre_s: seconds(totals.t_pre_ticks) / attempts,
-        t_acq_s: seconds(totals.t_acq_ticks) / attempts,
-        priority: totals.reward / totals.fulfilled as f64,
+        t_pre_s: of_attempts(seconds(totals.t_pre_ticks)),
+        t_acq_s: of_attempts(seconds(totals.t_acq_ticks)),
+        priority: (totals.fulfilled > 0).then(|| totals.reward / totals.fulfilled as f64),
         wait_s_per_orbit: seconds(totals.wait_ticks) / orbits,
-        failed_attitude: totals.failed_attitude as f64 / attempts,
-        failed_elevation: totals.failed_elevation as f64 / attempts,
+        failed_attitude: of_attempts(totals.failed_attitude as f64),
+        failed_elevation: of_attempts(totals.failed_elevation as f64),
     })
 }
 
-/// Mean, deviation and confidence of some quantity over missions.
-pub fn spread(missions: &[Mission], quantity: impl Fn(&Mission) -> f64) -> Spread {
-    let values: Vec<f64> = missions.iter().map(quantity).collect();
+/// Mean, deviation and confidence of a quantity over the missions that have it; `None` when none has.
+pub fn spread(missions: &[Mission], quantity: impl Fn(&Mission) -> Option<f64>) -> Option<Spread> {
+    let values: Vec<f64> = missions.iter().filter_map(quantity).collect();
     spread_of(&values)
 }
 
-/// Mean, deviation and confidence of numbers.
-pub fn spread_of(values: &[f64]) -> Spread {
+/// Mean, deviation and confidence of numbers; `None` of no numbers.
+///
+/// ```
+/// use swath_training::evaluate::spread_of;
+///
+/// let rewards = spread_of(&[24.0, 26.0, 28.0]).expect("there are numbers");
+/// assert_eq!((rewards.mean, rewards.deviation), (26.0, Some(2.0)));
+/// assert_eq!(spread_of(&[26.0]).and_then(|one| one.confidence_95), None);
+/// assert_eq!(spread_of(&[]), None);
+/// ```
+#[must_use]
+pub fn spread_of(values: &[f64]) -> Option<Spread> {
+    if values.is_empty() {
+        return None;
+    }
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let deviation = if count > 1.0 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
-    Spread { mean, deviation, confidence_95: student_975(count - 1.0) * deviation / count.sqrt() }
+    let deviation = (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt());
+    let confidence_95 = deviation.map(|deviation| student_975(count - 1.0) * deviation / count.sqrt());
+    Some(Spread { mean, deviation, confidence_95 })
 }
 
-/// The 97.5 % quantile of Student's t, by the expansion of Abramowitz & Stegun 26.7.5.
+/// The 97.5 % quantile of Student's t with at least one degree of freedom, by the expansion of Abramowitz & Stegun 26.7.5.
 fn student_975(freedom: f64) -> f64 {
     let x: f64 = 1.959_963_984_540_054;
     let g1 = (x.powi(3) + x) / 4.0;
     let g2 = (5.0 * x.powi(5) + 16.0 * x.powi(3) + 3.0 * x) / 96.0;
     let g3 = (3.0 * x.powi(7) + 19.0 * x.powi(5) + 17.0 * x.powi(3) - 15.0 * x) / 384.0;
-    if freedom < 1.0 {
-        return 0.0;
-    }
     x + g1 / freedom + g2 / freedom.powi(2) + g3 / freedom.powi(3)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use swath_sim::planner::PlannerSpec;
+
+    use super::*;
 
     #[test]
     fn spreads_follow_student() {
-        let found = spread_of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0]);
+        let found = spread_of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0]).unwrap();
         assert_relative_eq!(found.mean, 6.0);
-        assert_relative_eq!(found.deviation, 11.0f64.sqrt(), epsilon = 1e-12);
+        assert_relative_eq!(found.deviation.unwrap(), 11.0f64.sqrt(), epsilon = 1e-12);
         // t(0.975, 10) = 2.2281
-        assert_abs_diff_eq!(found.confidence_95, 2.2281, epsilon = 2e-3);
+        assert_abs_diff_eq!(found.confidence_95.unwrap(), 2.2281, epsilon = 2e-3);
+    }
+
+    fn missions(strips: u32, first_seed: u64, count: u64) -> Missions {
+        let mut episode = EpisodeConfig { orbits: 1.0, ..EpisodeConfig::default() };
+        episode.scenario.count = [strips; 2];
+        Missions { simulation: SimConfig::default(), episode, plant: PlantErrors::default(), first_seed, count }
+    }
+
+    fn heuristic() -> [Prepared; 1] {
+        [Prepared::new(&PlannerSpec::Heuristic(90.0)).unwrap()]
+    }
+
+    #[test]
+    fn seeds_that_run_over_are_refused_and_the_last_one_is_flown() {
+        let error = fly(&missions(50, u64::MAX - 1, 3), &heuristic(), || {}).unwrap_err().to_string();
+        assert!(error.contains("18446744073709551614, which is not at most 18446744073709551613"), "{error}");
+        let flown = fly(&missions(200, u64::MAX, 1), &heuristic(), || {}).unwrap();
+        assert_eq!(flown[0][0].seed, u64::MAX);
+        assert!(matches!(missions(50, 0, 0).seeds().map(|_| ()), Err(TrainingError::NoResult(_))));
+    }
+
+    #[test]
+    fn nothing_attempted_is_no_result_and_what_is_unknown_is_not_a_number() {
+        let error = fly(&missions(0, 0, 2), &heuristic(), || {}).unwrap_err().to_string();
+        let wanted = "there is no result: nothing was attempted in any mission: \
+                      at most 0 strips were asked for and 0 reachable";
+        assert_eq!(error, wanted);
+        let flown = fly(&missions(4, 0, 12), &heuristic(), || {}).unwrap().remove(0);
+        let idle = flown.iter().find(|it| it.attempts_per_orbit == 0.0).unwrap();
+        assert_eq!((idle.success_rate, idle.t_pre_s, idle.priority), (None, None, None));
+        assert_eq!(spread(&flown, |it| it.t_pre_s).unwrap().mean, 90.0, "over those that attempted something");
+        assert!(flown.iter().all(|it| it.requests == 4 && it.reachable <= 4));
+        assert!(flown.iter().any(|it| it.reachable < 4));
     }
 }

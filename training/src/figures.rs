@@ -1,6 +1,6 @@
 //! The paper's Figures 3, 4 and 5, each as SVG and PNG.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 use plotters::coord::Shift;
@@ -19,6 +19,9 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(140, 86, 75),
     RGBColor(127, 127, 127),
 ];
+
+/// Height of the labels [px].
+const LABEL_SIZE: i32 = 16;
 
 /// Steps over which a learning curve is smoothed.
 const SMOOTHING_STEPS: f64 = 50_000.0;
@@ -48,11 +51,11 @@ pub struct Box {
 pub struct Bars {
     /// Planner.
     pub planner: String,
-    /// Requests at the start.
-    pub requests: u32,
-    /// Reward per orbit, mean and deviation.
+    /// Strips asked for, as the axis names them.
+    pub requests: String,
+    /// Reward per orbit, mean and deviation; 0 for none.
     pub reward: (f64, f64),
-    /// Priority of imaged strips, mean and deviation.
+    /// Priority of imaged strips, mean and deviation; 0 for none.
     pub priority: (f64, f64),
     /// Mean transition time [s].
     pub t_pre_s: f64,
@@ -65,17 +68,17 @@ pub struct Bars {
 impl Curve {
     /// Averages runs given as (steps, return): each is smoothed over 50 000 steps, then mean and
     /// deviation are taken where all runs have come.
-    pub fn average(label: &str, runs: &[Vec<(f64, f64)>]) -> Curve {
+    pub fn average(label: &str, runs: &[Vec<(f64, f64)>]) -> Self {
         let ends = runs.iter().map(|run| run.last().map_or(0.0, |point| point.0));
         let end = ends.fold(f64::INFINITY, f64::min);
         let at = |index: usize| end * (index + 1) as f64 / POINTS as f64;
         let points = (0..POINTS).filter_map(|index| {
             let steps = at(index);
             let values: Option<Vec<f64>> = runs.iter().map(|run| smoothed(run, steps)).collect();
-            let spread = crate::evaluate::spread_of(&values?);
-            Some((steps, spread.mean, spread.deviation))
+            let spread = crate::evaluate::spread_of(&values?)?;
+            Some((steps, spread.mean, spread.deviation.unwrap_or(0.0)))
         });
-        Curve { label: label.to_owned(), points: points.collect() }
+        Self { label: label.to_owned(), points: points.collect() }
     }
 }
 
@@ -86,20 +89,32 @@ fn smoothed(run: &[(f64, f64)], steps: f64) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// Fig. 3: return over training steps.
+/// Fig. 3: return over training steps. `orbits` is the length of an episode, where it is known.
 ///
 /// # Errors
-/// Files that cannot be written.
-pub fn learning_curves(path: &Path, curves: &[Curve]) -> Result<()> {
-    draw(path, SIZE, &Plot::Curves(curves))
+/// Files that cannot be written, and curves without a point.
+pub fn learning_curves(path: &Path, curves: &[Curve], orbits: Option<f64>) -> Result<()> {
+    for curve in curves {
+        if curve.points.is_empty() {
+            return Err(nothing(&format!("curve {}: no episode ended in all of its runs", curve.label)));
+        }
+    }
+    let reward = match orbits {
+        Some(orbits) => format!("reward per episode of {orbits} orbits"),
+        None => "reward per episode".to_owned(),
+    };
+    draw(path, SIZE, curves.len(), &Plot::Curves { curves, reward: &reward })
 }
 
 /// Fig. 4: reward per orbit of each planner.
 ///
 /// # Errors
-/// Files that cannot be written.
+/// Files that cannot be written, and planners without a mission.
 pub fn boxes(path: &Path, boxes: &[Box]) -> Result<()> {
-    draw(path, SIZE, &Plot::Boxes(boxes))
+    if let Some(empty) = boxes.iter().find(|it| it.values.is_empty()) {
+        return Err(nothing(&format!("{} flew no mission", empty.label)));
+    }
+    draw(path, (boxes_width(boxes), SIZE.1), boxes.len(), &Plot::Boxes(boxes))
 }
 
 /// Fig. 5: behaviour over the density of requests.
@@ -107,11 +122,25 @@ pub fn boxes(path: &Path, boxes: &[Box]) -> Result<()> {
 /// # Errors
 /// Files that cannot be written.
 pub fn densities(path: &Path, bars: &[Bars]) -> Result<()> {
-    draw(path, (1200, 860), &Plot::Densities(bars))
+    draw(path, (1200, 860), bars.len(), &Plot::Densities(bars))
+}
+
+fn nothing(what: &str) -> TrainingError {
+    TrainingError::NoResult(format!("nothing to draw: {what}"))
+}
+
+/// Width at which no label under a box touches the next [px].
+fn boxes_width(boxes: &[Box]) -> u32 {
+    register_font();
+    let font = ("sans-serif", LABEL_SIZE).into_font();
+    let widths = boxes.iter().filter_map(|it| font.box_size(&it.label).ok());
+    let widest = widths.map(|(width, _)| width).max().unwrap_or(0);
+    // The axis has one slot more than there are boxes.
+    SIZE.0.max(110 + (boxes.len() as u32 + 1) * (widest + 16))
 }
 
 enum Plot<'a> {
-    Curves(&'a [Curve]),
+    Curves { curves: &'a [Curve], reward: &'a str },
     Boxes(&'a [Box]),
     Densities(&'a [Bars]),
 }
@@ -119,15 +148,26 @@ enum Plot<'a> {
 type Area<DB> = DrawingArea<DB, Shift>;
 type Drawn<DB> = std::result::Result<(), DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>>;
 
-fn draw(path: &Path, size: (u32, u32), plot: &Plot) -> Result<()> {
+fn draw(path: &Path, size: (u32, u32), parts: usize, plot: &Plot) -> Result<()> {
+    if parts == 0 {
+        return Err(nothing(&path.display().to_string()));
+    }
     register_font();
     let failed = |error: &dyn std::fmt::Display, path: &Path| {
         TrainingError::file("write", path)(std::io::Error::other(error.to_string()))
     };
-    let svg = path.with_extension("svg");
+    let svg = with_ending(path, "svg");
     plot.onto(&SVGBackend::new(&svg, size).into_drawing_area()).map_err(|error| failed(&error, &svg))?;
-    let png = path.with_extension("png");
+    let png = with_ending(path, "png");
     plot.onto(&BitMapBackend::new(&png, size).into_drawing_area()).map_err(|error| failed(&error, &png))
+}
+
+/// A path with an ending more, whatever points its name has.
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut path = path.as_os_str().to_owned();
+    path.push(".");
+    path.push(ending);
+    path.into()
 }
 
 /// The figures bring their own font, so that they look the same everywhere.
@@ -144,7 +184,7 @@ impl Plot<'_> {
     fn onto<DB: DrawingBackend>(&self, area: &Area<DB>) -> Drawn<DB> {
         area.fill(&WHITE)?;
         match self {
-            Plot::Curves(curves) => draw_curves(area, curves)?,
+            Plot::Curves { curves, reward } => draw_curves(area, curves, reward)?,
             Plot::Boxes(boxes) => draw_boxes(area, boxes)?,
             Plot::Densities(bars) => draw_densities(area, bars)?,
         }
@@ -152,26 +192,29 @@ impl Plot<'_> {
     }
 }
 
-fn draw_curves<DB: DrawingBackend>(area: &Area<DB>, curves: &[Curve]) -> Drawn<DB> {
+fn draw_curves<DB: DrawingBackend>(area: &Area<DB>, curves: &[Curve], reward: &str) -> Drawn<DB> {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let end = points().map(|point| point.0).fold(1.0, f64::max);
     let top = points().map(|point| point.1 + point.2).fold(1.0, f64::max);
+    let bottom = points().map(|point| point.1 - point.2).fold(0.0, f64::min);
+    let (unit, unit_name) = if end < 2e5 { (1e3, "thousand") } else { (1e6, "million") };
     let mut chart = ChartBuilder::on(area)
         .margin(16)
+        .caption("mean over 50 000 steps; band: standard deviation over runs", ("sans-serif", LABEL_SIZE))
         .x_label_area_size(48)
         .y_label_area_size(64)
-        .build_cartesian_2d(0.0..end / 1e6, 0.0..1.08 * top)?;
+        .build_cartesian_2d(0.0..end / unit, 1.08 * bottom..1.08 * top)?;
     chart
         .configure_mesh()
-        .x_desc("training steps [million]")
-        .y_desc("reward per episode of 6 orbits")
+        .x_desc(format!("training steps [{unit_name}]"))
+        .y_desc(reward)
         .light_line_style(WHITE)
         .label_style(("sans-serif", 18))
         .draw()?;
     for (curve, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
-        let line = curve.points.iter().map(|point| (point.0 / 1e6, point.1));
-        let upper = curve.points.iter().map(|point| (point.0 / 1e6, point.1 + point.2));
-        let lower = curve.points.iter().rev().map(|point| (point.0 / 1e6, point.1 - point.2));
+        let line = curve.points.iter().map(|point| (point.0 / unit, point.1));
+        let upper = curve.points.iter().map(|point| (point.0 / unit, point.1 + point.2));
+        let lower = curve.points.iter().rev().map(|point| (point.0 / unit, point.1 - point.2));
         let band: Vec<(f64, f64)> = upper.chain(lower).collect();
         chart.draw_series(std::iter::once(Polygon::new(band, colour.mix(0.2))))?;
         chart
@@ -189,28 +232,29 @@ fn draw_curves<DB: DrawingBackend>(area: &Area<DB>, curves: &[Curve]) -> Drawn<D
 
 fn draw_boxes<DB: DrawingBackend>(area: &Area<DB>, boxes: &[Box]) -> Drawn<DB> {
     let labels: Vec<&str> = boxes.iter().map(|it| it.label.as_str()).collect();
-    let values = || boxes.iter().flat_map(|it| &it.values);
-    let top = values().copied().fold(1.0, f64::max) as f32;
+    let quartiles: Vec<Quartiles> = boxes.iter().map(|it| Quartiles::new(&it.values)).collect();
+    let drawn = || quartiles.iter().flat_map(Quartiles::values);
+    let (bottom, top) = (drawn().fold(0.0, f32::min), drawn().fold(1.0, f32::max));
     let mut chart = ChartBuilder::on(area)
         .margin(16)
+        .caption("box: quartiles; whiskers: 1.5 times its height from it", ("sans-serif", LABEL_SIZE))
         .x_label_area_size(48)
         .y_label_area_size(64)
-        .build_cartesian_2d((0..boxes.len()).into_segmented(), 0.0..1.08 * top)?;
+        .build_cartesian_2d((0..boxes.len()).into_segmented(), 1.08 * bottom..1.08 * top)?;
     chart
         .configure_mesh()
-        .y_desc("reward per orbit")
+        .x_desc("planner")
+        .y_desc("reward per orbit, one value a mission")
         .x_labels(boxes.len() + 1)
         .x_label_formatter(&|place| match place {
             SegmentValue::CenterOf(index) => labels.get(*index).copied().unwrap_or("").to_owned(),
             _ => String::new(),
         })
         .light_line_style(WHITE)
-        .label_style(("sans-serif", 16))
+        .label_style(("sans-serif", LABEL_SIZE))
         .draw()?;
-    let drawn = boxes.iter().zip(COLOURS.iter().cycle()).enumerate().map(|(index, (it, colour))| {
-        Boxplot::new_vertical(SegmentValue::CenterOf(index), &Quartiles::new(&it.values))
-            .width(40)
-            .style(colour.stroke_width(2))
+    let drawn = quartiles.iter().zip(COLOURS.iter().cycle()).enumerate().map(|(index, (quartiles, colour))| {
+        Boxplot::new_vertical(SegmentValue::CenterOf(index), quartiles).width(40).style(colour.stroke_width(2))
     });
     chart.draw_series(drawn)?;
     Ok(())
@@ -226,9 +270,14 @@ struct Panel {
 }
 
 const PANELS: [Panel; 4] = [
-    Panel { title: "reward per orbit", value: |it| it.reward.0, deviation: |it| it.reward.1, part: |_| 0.0 },
     Panel {
-        title: "priority of imaged strips",
+        title: "reward per orbit, ± deviation over missions",
+        value: |it| it.reward.0,
+        deviation: |it| it.reward.1,
+        part: |_| 0.0,
+    },
+    Panel {
+        title: "priority of imaged strips, ± deviation over missions",
         value: |it| it.priority.0,
         deviation: |it| it.priority.1,
         part: |_| 0.0,
@@ -244,54 +293,62 @@ const PANELS: [Panel; 4] = [
 
 fn draw_densities<DB: DrawingBackend>(area: &Area<DB>, bars: &[Bars]) -> Drawn<DB> {
     for (part, panel) in area.split_evenly((2, 2)).iter().zip(&PANELS) {
-        draw_panel(part, bars, panel)?;
+        draw_panel(part, panel, bars)?;
     }
     Ok(())
 }
 
-fn draw_panel<DB: DrawingBackend>(area: &Area<DB>, bars: &[Bars], panel: &Panel) -> Drawn<DB> {
-    let unique = |mut items: Vec<String>| {
-        let mut seen = Vec::new();
-        items.retain(|item| {
-            !seen.contains(item) && {
-                seen.push(item.clone());
-                true
-            }
-        });
-        items
-    };
-    let planners = unique(bars.iter().map(|it| it.planner.clone()).collect());
-    let densities = unique(bars.iter().map(|it| it.requests.to_string()).collect());
-    let top = bars.iter().map(|it| (panel.value)(it) + (panel.deviation)(it)).fold(0.0, f64::max);
+/// Items without those that came before.
+fn unique<'a>(items: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut seen = Vec::new();
+    for item in items {
+        if !seen.contains(&item) {
+            seen.push(item);
+        }
+    }
+    seen
+}
+
+fn draw_panel<DB: DrawingBackend>(area: &Area<DB>, panel: &Panel, bars: &[Bars]) -> Drawn<DB> {
+    let planners = unique(bars.iter().map(|it| it.planner.as_str()));
+    let densities = unique(bars.iter().map(|it| it.requests.as_str()));
+    let top = bars.iter().map(|it| (panel.value)(it) + (panel.deviation)(it)).fold(1e-3, f64::max);
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .caption(panel.title, ("sans-serif", 20))
-        .x_label_area_size(36)
+        .x_label_area_size(46)
         .y_label_area_size(52)
         .build_cartesian_2d(0.0..densities.len() as f64, 0.0..1.25 * top)?;
     chart
         .configure_mesh()
         .disable_x_mesh()
-        .x_labels(0)
-        .x_desc(format!("requests: {}", densities.join(", ")))
+        // A mark every half: those between two whole numbers stand in the middle of a group.
+        .x_labels(2 * densities.len() + 1)
+        .x_label_formatter(&|place| {
+            let middle = (place.fract() - 0.5).abs() < 1e-6;
+            densities.get(*place as usize).filter(|_| middle).copied().unwrap_or("").to_owned()
+        })
+        .x_desc("strips asked for")
         .light_line_style(WHITE)
         .label_style(("sans-serif", 15))
         .draw()?;
     let width = 0.8 / planners.len() as f64;
     for (number, (planner, colour)) in planners.iter().zip(COLOURS.iter().cycle()).enumerate() {
-        let own = bars.iter().filter(|it| it.planner == *planner).enumerate();
-        let left = |index: usize| index as f64 + 0.1 + number as f64 * width;
-        let bar = |index: usize, height: f64, opacity: f64| {
-            Rectangle::new([(left(index), 0.0), (left(index) + 0.92 * width, height)], colour.mix(opacity).filled())
+        let own = bars.iter().filter(|it| it.planner == *planner).filter_map(|it| {
+            let group = densities.iter().position(|density| *density == it.requests)?;
+            Some((group as f64 + 0.1 + number as f64 * width, it))
+        });
+        let bar = |left: f64, height: f64, opacity: f64| {
+            Rectangle::new([(left, 0.0), (left + 0.92 * width, height)], colour.mix(opacity).filled())
         };
         chart
-            .draw_series(own.clone().map(|(index, it)| bar(index, (panel.value)(it), 0.6)))?
-            .label(planner)
+            .draw_series(own.clone().map(|(left, it)| bar(left, (panel.value)(it), 0.6)))?
+            .label(*planner)
             .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.mix(0.6).filled()));
-        chart.draw_series(own.clone().map(|(index, it)| bar(index, (panel.part)(it), 1.0)))?;
-        chart.draw_series(own.filter(|(_, it)| (panel.deviation)(it) > 0.0).map(|(index, it)| {
+        chart.draw_series(own.clone().map(|(left, it)| bar(left, (panel.part)(it), 1.0)))?;
+        chart.draw_series(own.filter(|(_, it)| (panel.deviation)(it) > 0.0).map(|(left, it)| {
             let (value, deviation) = ((panel.value)(it), (panel.deviation)(it));
-            let middle = left(index) + 0.46 * width;
+            let middle = left + 0.46 * width;
             PathElement::new([(middle, value - deviation), (middle, value + deviation)], BLACK.stroke_width(1))
         }))?;
     }
@@ -316,27 +373,80 @@ mod tests {
         assert!((last.2 - 8f64.sqrt()).abs() < 1e-12);
     }
 
-    #[test]
-    fn every_figure_is_drawn_as_svg_and_png_with_its_labels() {
-        let folder = tempfile::tempdir().unwrap();
-        let curve = Curve { label: "one".into(), points: vec![(0.0, 1.0, 0.5), (1e6, 3.0, 0.5)] };
-        learning_curves(&folder.path().join("fig3"), &[curve]).unwrap();
-        boxes(&folder.path().join("fig4"), &[Box { label: "two".into(), values: vec![1.0, 2.0, 4.0] }]).unwrap();
-        let bars = Bars {
+    fn bars(requests: &str) -> Bars {
+        Bars {
             planner: "three".into(),
-            requests: 2000,
+            requests: requests.into(),
             reward: (30.0, 2.0),
             priority: (0.8, 0.1),
             t_pre_s: 40.0,
             t_acq_s: 70.0,
             attempts: 50.0,
-        };
-        densities(&folder.path().join("fig5"), &[bars]).unwrap();
+        }
+    }
+
+    fn text(path: &Path) -> String {
+        std::fs::read_to_string(with_ending(path, "svg")).unwrap()
+    }
+
+    #[test]
+    fn every_figure_is_drawn_as_svg_and_png_with_its_labels() {
+        let folder = tempfile::tempdir().unwrap();
+        let curve = Curve { label: "one".into(), points: vec![(0.0, 1.0, 0.5), (1e6, 3.0, 0.5)] };
+        learning_curves(&folder.path().join("fig3"), &[curve], Some(6.0)).unwrap();
+        boxes(&folder.path().join("fig4"), &[Box { label: "two".into(), values: vec![1.0, 2.0, 4.0] }]).unwrap();
+        densities(&folder.path().join("fig5"), &[bars("2000"), bars("3000")]).unwrap();
         for (name, label) in [("fig3", "one"), ("fig4", "two"), ("fig5", "three")] {
             let path = folder.path().join(name);
-            assert!(std::fs::read_to_string(path.with_extension("svg")).unwrap().contains(label));
-            let png = std::fs::read(path.with_extension("png")).unwrap();
+            assert!(text(&path).contains(label));
+            let png = std::fs::read(with_ending(&path, "png")).unwrap();
             assert!(png.starts_with(b"\x89PNG") && png.len() > 2000, "{name}");
         }
+    }
+
+    #[test]
+    fn axes_say_what_is_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.b");
+        let curve = |end: f64| Curve { label: "<one>".into(), points: vec![(0.0, 1.0, 0.5), (end, 3.0, 0.5)] };
+        learning_curves(&path, &[curve(1e6)], Some(0.5)).unwrap();
+        let drawn = text(&path);
+        assert!(drawn.contains("reward per episode of 0.5 orbits") && drawn.contains("training steps [million]"));
+        assert!(drawn.contains("&lt;one&gt;"), "labels are text");
+        learning_curves(&path, &[curve(4e4)], None).unwrap();
+        let drawn = text(&path);
+        assert!(!drawn.contains("orbits") && drawn.contains("training steps [thousand]"));
+        densities(&path, &[bars("2000"), bars("3000 to 4000")]).unwrap();
+        let drawn = text(&path);
+        assert!(drawn.contains("2000\n") && drawn.contains("3000 to 4000\n") && drawn.contains("strips asked for"));
+    }
+
+    #[test]
+    fn labels_under_boxes_have_room() {
+        let long = |count: usize| -> Vec<Box> {
+            let label = "hop-ppo+lookahead, torque-10%".to_owned();
+            (0..count).map(|_| Box { label: label.clone(), values: vec![1.0, 2.0] }).collect()
+        };
+        assert_eq!(boxes_width(&long(1)), SIZE.0);
+        let font = ("sans-serif", LABEL_SIZE).into_font();
+        let label = font.box_size(&long(1)[0].label).unwrap().0;
+        assert!(boxes_width(&long(12)) > 12 * (label + 10), "{label}");
+    }
+
+    #[test]
+    fn nothing_to_draw_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("figure");
+        let empty = Curve { label: "one".into(), points: Vec::new() };
+        for error in [
+            learning_curves(&path, &[], None),
+            learning_curves(&path, &[empty], None),
+            boxes(&path, &[]),
+            boxes(&path, &[Box { label: "two".into(), values: Vec::new() }]),
+            densities(&path, &[]),
+        ] {
+            assert!(error.unwrap_err().to_string().contains("nothing to draw"));
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

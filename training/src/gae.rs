@@ -33,6 +33,15 @@ pub struct Decision {
 /// δₜ = γ^Δₜ·(rₜ + Vₜ₊₁) − Vₜ and Aₜ = δₜ + λ·γ^Δₜ·Aₜ₊₁, with γ per second. Equation 23's indices
 /// do not agree with equation 14; this is the form that does. A last entry that says
 /// [`Next::Decision`] is treated as terminated.
+///
+/// ```
+/// use swath_training::gae::{Decision, Next, advantages};
+///
+/// let imaged = Decision { reward: 1.0, duration_s: 100.0, value: 0.5, next: Next::Terminated };
+/// let advantage = advantages(&[imaged], 0.999, 0.95)[0];
+/// assert!((advantage - (0.999f64.powf(100.0) - 0.5)).abs() < 1e-12);
+/// ```
+#[must_use]
 pub fn advantages(sequence: &[Decision], gamma: f64, lambda: f64) -> Vec<f64> {
     let mut result = vec![0.0; sequence.len()];
     let (mut next_value, mut next_advantage) = (0.0, 0.0);

@@ -1,10 +1,10 @@
 //! A policy whose proposals are flown in the head: exact transition times, and the critic's word on what comes after.
 
-use swath_sim::catalogue::Candidate;
-use swath_sim::observation::observe;
+use swath_sim::learn::observation::observe;
 use swath_sim::planner::{
     Allowance, BeamSearch, Decision, DecisionContext, Experience, Planner, PlannerError, Rationale, Sequence,
 };
+use swath_sim::requests::catalogue::Candidate;
 
 use crate::error::{Result, TrainingError};
 use crate::policy::{Judgement, LearnedPlanner, Policy};

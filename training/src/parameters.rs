@@ -48,6 +48,7 @@ impl Layout {
     }
 
     /// How many numbers there are in all.
+    #[must_use]
     pub fn count(&self) -> usize {
         let sizes = self.entries.iter().map(|entry| numel(&entry.shape));
         sizes.sum::<i64>() as usize
@@ -71,7 +72,10 @@ pub struct Parameters {
 
 impl Parameters {
     /// Fresh values drawn from `rng`.
-    pub fn initial(layout: &Layout, rng: &mut impl Rng, device: Device) -> Result<Parameters> {
+    ///
+    /// # Errors
+    /// What libtorch refuses.
+    pub fn initial(layout: &Layout, rng: &mut impl Rng, device: Device) -> Result<Self> {
         let mut parts = Vec::with_capacity(layout.entries.len());
         for entry in &layout.entries {
             parts.push(match entry.fill {
@@ -80,11 +84,14 @@ impl Parameters {
             });
         }
         let parts: Vec<Tensor> = parts.iter().map(|part| part.reshape(-1)).collect();
-        Parameters::from_flat(layout, Tensor::f_cat(&parts, 0)?.to_device(device))
+        Self::from_flat(layout, Tensor::f_cat(&parts, 0)?.to_device(device))
     }
 
     /// Windows into a flat vector of [`Layout::count`] values.
-    pub fn from_flat(layout: &Layout, flat: Tensor) -> Result<Parameters> {
+    ///
+    /// # Errors
+    /// A vector of another length.
+    pub fn from_flat(layout: &Layout, flat: Tensor) -> Result<Self> {
         let mut leaves = Vec::with_capacity(layout.entries.len());
         let mut offset = 0;
         for entry in &layout.entries {
@@ -94,12 +101,13 @@ impl Parameters {
             leaves.push(window.set_requires_grad(true));
             offset += length;
         }
-        Ok(Parameters { flat, leaves })
+        Ok(Self { flat, leaves })
     }
 
     /// The same values, for use on another thread.
-    pub fn share(&self) -> Parameters {
-        Parameters { flat: self.flat.shallow_clone(), leaves: self.leaves.iter().map(Tensor::shallow_clone).collect() }
+    #[must_use]
+    pub fn share(&self) -> Self {
+        Self { flat: self.flat.shallow_clone(), leaves: self.leaves.iter().map(Tensor::shallow_clone).collect() }
     }
 
     /// The tensor in a slot.
@@ -109,6 +117,9 @@ impl Parameters {
 
     /// Gradient of a scalar with respect to all values, as one vector like [`Parameters::flat`].
     /// What the scalar does not depend on gets 0.
+    ///
+    /// # Errors
+    /// A tensor that is no scalar, or has no gradient.
     pub fn gradient(&self, scalar: &Tensor) -> Result<Tensor> {
         let gradients = Tensor::f_run_backward(&[scalar], &self.leaves, false, false)?;
         let pieces: Vec<Tensor> = gradients

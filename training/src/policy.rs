@@ -2,20 +2,23 @@
 
 use std::path::Path;
 
-use swath_sim::observation::{ObservationSet, observe};
+use serde::Serialize;
+use serde_json::Value;
+use swath_sim::config::SimConfig;
+use swath_sim::learn::observation::{ObservationSet, observe};
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Rationale};
 use tch::{Device, Tensor};
 
-use crate::checkpoint;
+use crate::checkpoint::{self, settings};
 use crate::config::{EnvironmentConfig, RunConfig};
 use crate::distribution::{best_choice, squash};
 use crate::environment::{Action, ObservationShape};
 use crate::error::{Result, TrainingError};
+use crate::learn::{decision, wait};
 use crate::network::Network;
 use crate::parameters::Parameters;
 use crate::rollout::{finite, observations, to_vec};
 use crate::store::Content;
-use crate::strips::decision;
 
 /// Largest file that is read as a policy [bytes]; the paper's own sizes fit.
 const LARGEST_FILE: u64 = 1 << 30;
@@ -30,6 +33,7 @@ pub struct Policy {
     steps: u64,
     digest: String,
     longest_s: f64,
+    satellite: SimConfig,
 }
 
 /// What a policy says about one observation.
@@ -43,31 +47,46 @@ pub struct Judgement {
     pub action: Action,
 }
 
+/// Where a setting of the satellite that is flown differs from the one that a policy was trained on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// Dotted path, as in a mission's `[sim]` section.
+    pub setting: String,
+    /// Its value in training.
+    pub trained: Value,
+    /// Its value in flight.
+    pub flown: Value,
+}
+
+/// The bytes of a file that may be a policy.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
+    let size = std::fs::metadata(path).map_err(TrainingError::file("read", path))?.len();
+    if size > LARGEST_FILE {
+        let reason = format!("it has {size} bytes, a policy has at most {LARGEST_FILE}");
+        return Err(TrainingError::unsuitable(path, reason));
+    }
+    std::fs::read(path).map_err(TrainingError::file("read", path))
+}
+
 impl Policy {
     /// Reads a policy. libtorch runs on one thread afterwards, so that the same observation always
     /// gives the same action.
     ///
     /// # Errors
     /// A file that cannot be read, is damaged, or was trained on another problem than strips.
-    pub fn load(path: &Path) -> Result<Policy> {
-        let size = std::fs::metadata(path).map_err(TrainingError::file("read", path))?.len();
-        if size > LARGEST_FILE {
-            let reason = format!("it has {size} bytes, a policy has at most {LARGEST_FILE}");
-            return Err(TrainingError::damaged(path, reason));
-        }
-        let bytes = std::fs::read(path).map_err(TrainingError::file("read", path))?;
-        Policy::from_bytes(&bytes, path)
+    pub fn load(path: &Path) -> Result<Self> {
+        Self::from_bytes(&read(path)?, path)
     }
 
     /// As [`Policy::load`], with the bytes of a file already at hand; `path` is what errors name.
     ///
     /// # Errors
     /// As [`Policy::load`].
-    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Policy> {
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         let content = Content::from_bytes(bytes, path)?;
         let header = checkpoint::header(&content, path)?;
         let EnvironmentConfig::Strips(strips) = &header.run.environment else {
-            return Err(TrainingError::damaged(path, "it was not trained on strips"));
+            return Err(TrainingError::unsuitable(path, "it was not trained on strips"));
         };
         let shape =
             ObservationShape { tokens: strips.simulation.planning.candidates, features: strips.observation.features() };
@@ -75,43 +94,69 @@ impl Policy {
         let (network, layout) = Network::new(&header.run.network, shape, longest_s)?;
         let weights = checkpoint::flat_weights(&content, &layout, path)?;
         tch::set_num_threads(1);
-        Ok(Policy {
+        Ok(Self {
             parameters: Parameters::from_flat(&layout, Tensor::from_slice(&weights))?,
             network,
             set: strips.observation,
             steps: header.steps,
             digest: content.digest(),
             longest_s,
+            satellite: strips.simulation.clone(),
             run: header.run,
         })
     }
 
     /// SHA-256 of header and weights, in hexadecimal.
+    #[must_use]
     pub fn digest(&self) -> &str {
         &self.digest
     }
 
     /// The run that trained it.
+    #[must_use]
     pub fn run(&self) -> &RunConfig {
         &self.run
     }
 
+    /// The satellite that it was trained on.
+    #[must_use]
+    pub fn satellite(&self) -> &SimConfig {
+        &self.satellite
+    }
+
+    /// Every setting in which a satellite is not the one that it was trained on.
+    ///
+    /// # Errors
+    /// A satellite that JSON cannot hold.
+    pub fn differences(&self, flown: &SimConfig) -> Result<Vec<Difference>> {
+        let (trained, flown) = (settings(&self.satellite)?, settings(flown)?);
+        let differing = trained.into_iter().filter_map(|(setting, trained)| {
+            let flown = flown.get(&setting).cloned().unwrap_or(Value::Null);
+            (trained != flown).then_some(Difference { setting, trained, flown })
+        });
+        Ok(differing.collect())
+    }
+
     /// Environment steps that it was trained for.
+    #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
     /// Features it wants of each strip.
+    #[must_use]
     pub fn observation_set(&self) -> ObservationSet {
         self.set
     }
 
     /// Size of the observations it takes.
+    #[must_use]
     pub fn shape(&self) -> ObservationShape {
         self.network.shape()
     }
 
     /// Longest transition it was trained with [s].
+    #[must_use]
     pub fn longest_transition_s(&self) -> f64 {
         self.longest_s
     }
@@ -186,12 +231,14 @@ pub struct LearnedPlanner {
 
 impl LearnedPlanner {
     /// A planner that follows a policy.
-    pub fn new(policy: Policy) -> LearnedPlanner {
+    #[must_use]
+    pub fn new(policy: Policy) -> Self {
         let shape = policy.shape();
-        LearnedPlanner { policy, features: vec![0.0; shape.len()], valid: vec![false; shape.tokens], judgement: None }
+        Self { policy, features: vec![0.0; shape.len()], valid: vec![false; shape.tokens], judgement: None }
     }
 
     /// The policy.
+    #[must_use]
     pub fn policy(&self) -> &Policy {
         &self.policy
     }
@@ -214,6 +261,7 @@ impl LearnedPlanner {
     }
 
     /// What the policy said at the last decision; none before the first and after a wait.
+    #[must_use]
     pub fn judgement(&self) -> Option<&Judgement> {
         self.judgement.as_ref()
     }
@@ -236,8 +284,7 @@ impl Planner for LearnedPlanner {
     fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {
         self.judgement = None;
         if context.candidates.is_empty() {
-            let ticks = context.model.period.ticks_ceil(crate::strips::WAIT_S).max(1);
-            return Ok(Decision::Wait { ticks });
+            return Ok(wait(context.model));
         }
         let judgement = self.consider(context).map_err(|error| PlannerError::Policy(error.to_string()))?;
         let action = judgement.action;

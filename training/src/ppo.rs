@@ -13,6 +13,7 @@ use crate::error::{Result, TrainingError};
 use crate::network::{Network, Observations};
 use crate::parameters::Parameters;
 use crate::rollout::{self, Segment};
+use crate::stop::Stop;
 
 /// The learner's state besides the weights.
 #[derive(Debug)]
@@ -43,6 +44,10 @@ pub struct Lesson<'a> {
     pub aim: Aim,
     /// Adam's step.
     pub learning_rate: f64,
+    /// Environment steps taken so far, for errors.
+    pub step: u64,
+    /// Ends it before its time.
+    pub stop: &'a Stop,
 }
 
 /// The loss that is made small.
@@ -91,71 +96,92 @@ pub struct UpdateStatistics {
     pub epochs: f64,
 }
 
-/// Sums over a shard's decisions, in the order of [`SUMS`] entries of a tensor.
+/// Number of sums over a shard's decisions, in the order in which [`Objective::loss`] gives them.
 const SUMS: usize = 6;
+
+/// Sums over all minibatches of an update.
+#[derive(Debug, Default)]
+struct Whole {
+    sums: [f64; SUMS],
+    norm: f64,
+    minibatches: f64,
+}
 
 impl Ppo {
     /// A fresh learner for `count` weights.
-    pub fn new(config: PpoConfig, count: usize, device: Device) -> Ppo {
+    #[must_use]
+    pub fn new(config: PpoConfig, count: usize, device: Device) -> Self {
         let kl_coefficient = config.kl_penalty.map_or(0.0, |penalty| penalty.coefficient);
-        Ppo { adam: Adam::new(count, device), kl_coefficient, config }
+        Self { adam: Adam::new(count, device), kl_coefficient, config }
     }
 
     /// Changes the weights by several passes over a batch of experience.
     ///
     /// # Errors
-    /// A gradient that is not finite; `step` is named in the error.
+    /// A gradient that is not finite. [`TrainingError::Stopped`], with weights that are partly changed.
     pub fn update(
         &mut self,
         network: &Network,
         parameters: &mut Parameters,
         lesson: Lesson<'_>,
         rng: &mut impl Rng,
-        step: u64,
     ) -> Result<UpdateStatistics> {
-        let Lesson { segments, aim, learning_rate } = lesson;
-        let device = parameters.flat.device();
-        let batch = Batch::new(network, segments, device)?;
+        let batch = Batch::new(network, lesson.segments, parameters.flat.device())?;
         let mut order: Vec<i64> = (0..batch.len() as i64).collect();
-        let mut statistics =
-            UpdateStatistics { explained_variance: explained_variance(segments), ..UpdateStatistics::default() };
-        let (mut sums, mut norm, mut minibatches) = ([0.0; SUMS], 0.0, 0.0);
+        let (mut whole, mut epochs, mut kl) = (Whole::default(), 0.0, 0.0);
         for _ in 0..self.config.epochs {
             order.shuffle(rng);
-            let mut kl = 0.0;
-            for minibatch in order.chunks(self.config.minibatch) {
-                let (gradient, shard_sums) = self.gradient(network, parameters, &batch, aim, minibatch)?;
-                let length = gradient.norm().double_value(&[]);
-                if !length.is_finite() {
-                    let quantity = "the gradient";
-                    return Err(TrainingError::NotFinite { quantity, step });
-                }
-                let scale = (self.config.gradient_norm / (length + 1e-6)).min(1.0);
-                self.adam.step(parameters, &(gradient * scale), learning_rate);
-                for (sum, shard_sum) in sums.iter_mut().zip(shard_sums) {
-                    *sum += shard_sum;
-                }
-                kl += shard_sums[2];
-                norm += length;
-                minibatches += 1.0;
-            }
-            statistics.kl = kl / batch.len() as f64;
-            statistics.epochs += 1.0;
-            if aim == Aim::Improve && self.config.kl_stop.is_some_and(|limit| statistics.kl > limit) {
+            kl = self.pass(network, parameters, &lesson, &batch, &order, &mut whole)? / batch.len() as f64;
+            epochs += 1.0;
+            if lesson.aim == Aim::Improve && self.config.kl_stop.is_some_and(|limit| kl > limit) {
                 break;
             }
         }
-        let decisions = batch.len() as f64 * statistics.epochs;
-        statistics.surrogate = sums[0] / decisions;
-        statistics.value_loss = sums[1] / decisions;
-        statistics.clip_fraction = sums[3] / decisions;
-        statistics.entropy = sums[4] / decisions;
-        statistics.transition_entropy = sums[5] / decisions;
-        statistics.gradient_norm = norm / minibatches;
-        if aim == Aim::Improve {
-            self.adapt_kl(statistics.kl);
+        if lesson.aim == Aim::Improve {
+            self.adapt_kl(kl);
         }
-        Ok(statistics)
+        let decisions = batch.len() as f64 * epochs;
+        Ok(UpdateStatistics {
+            surrogate: whole.sums[0] / decisions,
+            value_loss: whole.sums[1] / decisions,
+            kl,
+            clip_fraction: whole.sums[3] / decisions,
+            entropy: whole.sums[4] / decisions,
+            transition_entropy: whole.sums[5] / decisions,
+            gradient_norm: whole.norm / whole.minibatches,
+            explained_variance: explained_variance(lesson.segments),
+            epochs,
+        })
+    }
+
+    /// One pass over a batch in the given order; the sum of the KL divergence over its decisions.
+    fn pass(
+        &mut self,
+        network: &Network,
+        parameters: &mut Parameters,
+        lesson: &Lesson<'_>,
+        batch: &Batch,
+        order: &[i64],
+        whole: &mut Whole,
+    ) -> Result<f64> {
+        let mut kl = 0.0;
+        for minibatch in order.chunks(self.config.minibatch) {
+            lesson.stop.check()?;
+            let (gradient, sums) = self.gradient(network, parameters, batch, lesson.aim, minibatch)?;
+            let norm = gradient.norm().double_value(&[]);
+            if !norm.is_finite() {
+                return Err(TrainingError::NotFinite { quantity: "the gradient", step: lesson.step });
+            }
+            let scale = (self.config.gradient_norm / (norm + 1e-6)).min(1.0);
+            self.adam.step(parameters, &(gradient * scale), lesson.learning_rate);
+            kl += sums[2];
+            for (sum, own) in whole.sums.iter_mut().zip(sums) {
+                *sum += own;
+            }
+            whole.norm += norm;
+            whole.minibatches += 1.0;
+        }
+        Ok(kl)
     }
 
     /// Gradient of the mean loss over a minibatch, and sums of its parts: the minibatch is cut into
@@ -272,7 +298,7 @@ impl Objective<'_> {
 }
 
 impl Batch {
-    fn new(network: &Network, segments: &[Segment], device: Device) -> Result<Batch> {
+    fn new(network: &Network, segments: &[Segment], device: Device) -> Result<Self> {
         let ObservationShape { tokens, features } = network.shape();
         let join = |part: fn(&Segment) -> &[f32]| {
             let joined: Vec<f32> = segments.iter().flat_map(part).copied().collect();
@@ -290,7 +316,7 @@ impl Batch {
         let latent = join(|it| &it.latent);
         let gaussian = SquashedGaussian::from_outputs(&join(|it| &it.gaussian).view([-1, 2]));
         let (advantage, value) = (join(|it| &it.advantage), join(|it| &it.value));
-        Ok(Batch {
+        Ok(Self {
             observations,
             choice: Tensor::from_slice(&choice).to_device(device),
             log_probabilities: distribution::log_probabilities(&logits),
@@ -306,10 +332,10 @@ impl Batch {
         self.choice.size()[0] as usize
     }
 
-    fn rows(&self, rows: &[i64]) -> Batch {
+    fn rows(&self, rows: &[i64]) -> Self {
         let index = Tensor::from_slice(rows).to_device(self.choice.device());
         let pick = |tensor: &Tensor| tensor.index_select(0, &index);
-        Batch {
+        Self {
             observations: Observations {
                 features: pick(&self.observations.features),
                 valid: self.observations.valid.as_ref().map(pick),

@@ -13,6 +13,7 @@ use crate::error::{Result, TrainingError};
 use crate::gae::{self, Next};
 use crate::network::{Network, Observations};
 use crate::parameters::Parameters;
+use crate::stop::Stop;
 
 /// What an episode has brought so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -30,7 +31,7 @@ pub struct Tally {
 }
 
 impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Tally) {
+    fn add_assign(&mut self, other: Self) {
         self.reward += other.reward;
         self.duration_s += other.duration_s;
         self.attempts += other.attempts;
@@ -66,19 +67,26 @@ pub struct SlotState {
 impl Slot {
     /// Begins a first episode, cut off after at most `stagger` decisions if that is not 0; streams of one seed are
     /// independent of each other.
-    pub fn new(mut environment: Box<dyn Environment>, seed: u64, stream: u64, stagger: u64) -> Result<Slot> {
+    ///
+    /// # Errors
+    /// Those of the environment.
+    pub fn new(mut environment: Box<dyn Environment>, seed: u64, stream: u64, stagger: u64) -> Result<Self> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
         let first = rng.random();
         environment.reset(first)?;
         let limit = (stagger > 0).then(|| rng.random_range(1..=stagger));
-        Ok(Slot { environment, rng, seed: first, actions: Vec::new(), limit, tally: Tally::default() })
+        Ok(Self { environment, rng, seed: first, actions: Vec::new(), limit, tally: Tally::default() })
     }
 
-    /// Brings an environment back to a saved state. Should an environment that has changed since
-    /// end the episode sooner, the next one begins.
-    pub fn restore(environment: Box<dyn Environment>, state: SlotState) -> Result<Slot> {
-        let mut slot = Slot {
+    /// Brings an environment back to a saved state. Where a teacher leads it is asked again before each step, because time
+    /// may pass meanwhile and because it may remember what it flew. Should an environment that has changed since end the
+    /// episode sooner, the next one begins.
+    ///
+    /// # Errors
+    /// Those of the environment.
+    pub fn restore(environment: Box<dyn Environment>, state: SlotState, lead: Lead) -> Result<Self> {
+        let mut slot = Self {
             environment,
             rng: state.rng,
             seed: state.seed,
@@ -88,6 +96,9 @@ impl Slot {
         };
         slot.environment.reset(slot.seed)?;
         for action in state.actions {
+            if lead == Lead::Teacher {
+                slot.environment.teach()?;
+            }
             if slot.step(action)?.progress != Progress::Continues {
                 slot.begin()?;
                 break;
@@ -97,6 +108,7 @@ impl Slot {
     }
 
     /// What must be saved.
+    #[must_use]
     pub fn state(&self) -> SlotState {
         SlotState { rng: self.rng.clone(), seed: self.seed, actions: self.actions.clone(), limit: self.limit }
     }
@@ -184,6 +196,19 @@ pub enum Lead {
     Teacher,
 }
 
+/// How experience is gathered.
+#[derive(Debug, Clone, Copy)]
+pub struct Course<'a> {
+    /// Steps of every environment.
+    pub steps: usize,
+    /// Discount of the advantages.
+    pub discount: Discount,
+    /// Whose actions are carried out.
+    pub lead: Lead,
+    /// Ends it before its time.
+    pub stop: &'a Stop,
+}
+
 /// The policy as rollouts use it.
 pub struct Actor<'a> {
     /// Structure.
@@ -196,23 +221,29 @@ pub struct Actor<'a> {
 
 impl Group {
     /// Environments of the same shape.
-    pub fn new(slots: Vec<Slot>, shape: ObservationShape) -> Group {
-        Group { slots, shape }
+    #[must_use]
+    pub fn new(slots: Vec<Slot>, shape: ObservationShape) -> Self {
+        Self { slots, shape }
     }
 
     /// The environments.
+    #[must_use]
     pub fn slots(&self) -> &[Slot] {
         &self.slots
     }
 
-    /// Steps every environment `steps` times.
-    pub fn collect(&mut self, actor: &Actor, steps: usize, discount: Discount, lead: Lead) -> Result<Segment> {
+    /// Steps every environment as often as the course says.
+    ///
+    /// # Errors
+    /// Those of the environments, outputs of the policy that are not finite, and [`TrainingError::Stopped`].
+    pub fn collect(&mut self, actor: &Actor, course: &Course<'_>) -> Result<Segment> {
+        let Course { steps, discount, .. } = *course;
         let _guard = tch::no_grad_guard();
         let mut segment = Segment::default();
         let mut decisions: Vec<Vec<gae::Decision>> = vec![Vec::with_capacity(steps); self.slots.len()];
         let mut last = Ends::default();
         for _ in 0..steps {
-            self.step_all(actor, lead, &mut segment, &mut decisions, &mut last)?;
+            self.step_all(actor, course, &mut segment, &mut decisions, &mut last)?;
         }
         for (index, slot) in self.slots.iter().enumerate() {
             if decisions[index].last().is_some_and(|it| it.next == Next::Decision) {
@@ -233,12 +264,12 @@ impl Group {
     fn step_all(
         &mut self,
         actor: &Actor,
-        lead: Lead,
+        course: &Course<'_>,
         segment: &mut Segment,
         decisions: &mut [Vec<gae::Decision>],
         last: &mut Ends,
     ) -> Result<()> {
-        let taught = self.taught(lead)?;
+        let taught = self.taught(course)?;
         let (features, valid) = self.observe(segment)?;
         let seen = observations(features, valid, self.shape, actor.device);
         let first = segment.choice.len();
@@ -291,13 +322,17 @@ impl Group {
     }
 
     /// What the teachers do next, where they lead. Teachers may let time pass, so observations come after this.
-    fn taught(&mut self, lead: Lead) -> Result<Option<Vec<Action>>> {
-        match lead {
-            Lead::Policy => Ok(None),
-            Lead::Teacher => {
-                self.slots.iter_mut().map(|slot| slot.environment.teach()).collect::<Result<_>>().map(Some)
-            }
+    fn taught(&mut self, course: &Course<'_>) -> Result<Option<Vec<Action>>> {
+        course.stop.check()?;
+        if course.lead == Lead::Policy {
+            return Ok(None);
         }
+        let taught = self.slots.iter_mut().map(|slot| {
+            // A teacher may think long.
+            course.stop.check()?;
+            slot.environment.teach()
+        });
+        taught.collect::<Result<_>>().map(Some)
     }
 
     /// Appends a choice and a latent for every environment: those that were taught, or else drawn ones; and what the
@@ -375,6 +410,7 @@ impl Ends {
 }
 
 /// Tensors of a batch of observations given as rows.
+#[must_use]
 pub fn observations(features: &[f32], valid: &[bool], shape: ObservationShape, device: Device) -> Observations {
     let (tokens, width) = (shape.tokens as i64, shape.features as i64);
     let features = Tensor::from_slice(features).view([-1, tokens, width]);
@@ -393,6 +429,9 @@ pub(crate) fn finite(numbers: Vec<f32>, quantity: &'static str) -> Result<Vec<f3
 }
 
 /// The numbers of a tensor in row order.
+///
+/// # Errors
+/// A tensor of another kind of number.
 pub fn to_vec(tensor: &Tensor) -> Result<Vec<f32>> {
     Ok(Vec::<f32>::try_from(tensor.detach().reshape(-1))?)
 }

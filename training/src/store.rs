@@ -89,10 +89,10 @@ number!(u8, Dtype::U8);
 
 impl Stored {
     /// Numbers in row order.
-    pub fn new<N: Number>(shape: &[usize], numbers: &[N]) -> Stored {
+    pub fn new<N: Number>(shape: &[usize], numbers: &[N]) -> Self {
         let mut bytes = Vec::with_capacity(size_of_val(numbers));
         numbers.iter().for_each(|number| number.put(&mut bytes));
-        Stored { dtype: N::DTYPE, shape: shape.to_vec(), bytes }
+        Self { dtype: N::DTYPE, shape: shape.to_vec(), bytes }
     }
 
     fn numbers<N: Number>(&self) -> Option<Vec<N>> {
@@ -113,10 +113,13 @@ impl Content {
     /// When it is missing or holds another kind of number; `path` is named.
     pub fn numbers<N: Number>(&self, name: &str, path: &Path) -> Result<Vec<N>> {
         let numbers = self.tensors.get(name).and_then(Stored::numbers);
-        numbers.ok_or_else(|| TrainingError::damaged(path, format!("it has no {:?} tensor {name}", N::DTYPE)))
+        numbers.ok_or_else(|| TrainingError::unsuitable(path, format!("it has no {:?} tensor {name}", N::DTYPE)))
     }
 
     /// The file's bytes; the same content always gives the same bytes.
+    ///
+    /// # Errors
+    /// Tensors whose bytes do not fit their shape.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let label = Label { sha256: self.digest(), header: self.header.clone() };
         let metadata = HashMap::from([(LABEL.to_owned(), json(&label)?)]);
@@ -127,19 +130,25 @@ impl Content {
     /// Reads bytes back.
     ///
     /// # Errors
-    /// Anything but what [`Content::to_bytes`] wrote; `path` is named.
-    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Content> {
+    /// [`TrainingError::Damaged`] for what [`Content::to_bytes`] wrote and something changed, and
+    /// [`TrainingError::Unsuitable`] for what it never wrote; `path` is named.
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         let damaged = |reason: String| TrainingError::damaged(path, reason);
+        let foreign = |reason: &str| TrainingError::unsuitable(path, reason);
+        // Eight bytes of length, then JSON: what begins otherwise never was such a file, whatever its length.
+        if bytes.get(8).is_some_and(|&byte| byte != b'{') {
+            return Err(foreign("it is no policy and no checkpoint"));
+        }
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|error| damaged(error.to_string()))?;
         let label = metadata.metadata().as_ref().and_then(|it| it.get(LABEL));
-        let label = label.ok_or_else(|| damaged("it was not written by swath-train".into()))?;
+        let label = label.ok_or_else(|| foreign("it was not written by swath-train"))?;
         let label: Label = serde_json::from_str(label).map_err(|error| damaged(error.to_string()))?;
         let views = SafeTensors::deserialize(bytes).map_err(|error| damaged(error.to_string()))?;
         let tensors = views.iter().map(|(name, view)| {
             let stored = Stored { dtype: view.dtype(), shape: view.shape().to_vec(), bytes: view.data().to_vec() };
             (name.to_owned(), stored)
         });
-        let content = Content { header: label.header, tensors: tensors.collect() };
+        let content = Self { header: label.header, tensors: tensors.collect() };
         if content.digest() != label.sha256 {
             return Err(damaged("its digest does not fit its content".into()));
         }
@@ -150,12 +159,13 @@ impl Content {
     ///
     /// # Errors
     /// As [`Content::from_bytes`], and when it cannot be read.
-    pub fn read(path: &Path) -> Result<Content> {
+    pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).map_err(TrainingError::file("read", path))?;
-        Content::from_bytes(&bytes, path)
+        Self::from_bytes(&bytes, path)
     }
 
     /// SHA-256 over header, names, shapes and numbers, in hexadecimal.
+    #[must_use]
     pub fn digest(&self) -> String {
         let mut hasher = Sha256::new();
         let mut part = |bytes: &[u8]| {
@@ -192,6 +202,9 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// JSON text of a value.
+///
+/// # Errors
+/// A value that JSON cannot hold.
 pub fn json(value: &impl Serialize) -> Result<String> {
     serde_json::to_string(value).map_err(|error| TrainingError::Environment(error.to_string()))
 }
@@ -233,6 +246,18 @@ mod tests {
             // A flipped space of the padding changes nothing that is read.
             assert!(read.is_err() || bytes[place] == b' ', "byte {place}");
         }
+    }
+
+    #[test]
+    fn what_is_no_file_of_ours_is_not_called_damaged() {
+        let refused = |bytes: &[u8]| Content::from_bytes(bytes, Path::new("other")).unwrap_err().to_string();
+        let text = refused(b"# Swath\n\nSwath flies and operates one super-agile satellite.\n");
+        assert_eq!(text, "other cannot be used here: it is no policy and no checkpoint");
+        let tensors = [("weights", Stored::new(&[1], &[1.0f32]))];
+        let foreign = safetensors::serialize(tensors.iter().map(|(name, it)| (name, it)), None).unwrap();
+        assert_eq!(refused(&foreign), "other cannot be used here: it was not written by swath-train");
+        let missing = sample().numbers::<f32>("bias", Path::new("other")).unwrap_err().to_string();
+        assert_eq!(missing, "other cannot be used here: it has no F32 tensor bias");
     }
 
     #[test]

@@ -14,12 +14,15 @@ pub struct EventWriter {
 
 impl EventWriter {
     /// Begins a new event file in a folder; files of earlier parts of a run stay beside it.
-    pub fn create(folder: &Path) -> Result<EventWriter> {
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create(folder: &Path) -> Result<Self> {
         let seconds = wall_time();
         let name = format!("events.out.tfevents.{:020.6}.swath-train", seconds);
         let path = folder.join(name);
         let file = File::create(&path).map_err(TrainingError::file("write", &path))?;
-        let mut writer = EventWriter { file: BufWriter::new(file) };
+        let mut writer = Self { file: BufWriter::new(file) };
         let mut event = Message::default();
         event.double(1, seconds);
         event.bytes(3, b"brain.Event:2");
@@ -28,6 +31,9 @@ impl EventWriter {
     }
 
     /// Writes scalars of one step, and flushes them; those that are not finite are left out.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
     pub fn scalars(&mut self, step: u64, scalars: &[(&str, f64)], folder: &Path) -> Result<()> {
         let mut summary = Message::default();
         for (tag, value) in scalars.iter().filter(|(_, value)| value.is_finite()) {

@@ -29,8 +29,9 @@ pub struct Toy {
 
 impl Toy {
     /// A toy with this many tokens, of which at least two are valid at any time.
-    pub fn new(tokens: usize) -> Toy {
-        Toy {
+    #[must_use]
+    pub fn new(tokens: usize) -> Self {
+        Self {
             tokens,
             rng: ChaCha8Rng::seed_from_u64(0),
             worth: vec![0.0; tokens],
@@ -50,8 +51,9 @@ impl Toy {
 
     /// The value of being about to draw fresh tokens when acting optimally, by iterating
     /// V = E[max γ^Δ·(worth + V)] over `samples` draws.
+    #[must_use]
     pub fn optimal_value(tokens: usize, gamma: f64, samples: usize) -> f64 {
-        let mut toy = Toy::new(tokens);
+        let mut toy = Self::new(tokens);
         let draws: Vec<Vec<(f64, f64)>> = (0..samples)
             .map(|_| {
                 toy.draw();
@@ -70,6 +72,7 @@ impl Toy {
     }
 
     /// The optimal action, given [`Toy::optimal_value`].
+    #[must_use]
     pub fn best(&self, gamma: f64, value: f64) -> Action {
         let gain = |token: usize| {
             let (worth, duration_s) = self.prospect(token);

@@ -1,5 +1,6 @@
 //! A run in progress: environments, weights and learner, advanced one update at a time.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use rand::SeedableRng;
@@ -9,13 +10,15 @@ use tch::Device;
 
 use crate::adam::Adam;
 use crate::checkpoint;
-use crate::config::{EnvironmentConfig, RunConfig};
+use crate::config::{EnvironmentConfig, RunConfig, WarmStartConfig};
 use crate::environment::Environment;
 use crate::error::{Result, TrainingError};
 use crate::network::Network;
 use crate::parameters::{Layout, Parameters};
 use crate::ppo::{Aim, Lesson, Ppo, UpdateStatistics};
-use crate::rollout::{Actor, Discount, Group, Lead, Segment, Slot, SlotState, Tally};
+use crate::report::Report;
+use crate::rollout::{Actor, Course, Discount, Group, Lead, Segment, Slot, SlotState, Tally};
+use crate::stop::Stop;
 use crate::strips::Strips;
 use crate::toy::Toy;
 
@@ -32,14 +35,28 @@ pub struct Trainer {
     parameters: Parameters,
     ppo: Ppo,
     groups: Vec<Group>,
+    /// The warm start, while it is not over.
+    lessons: Option<Lessons>,
     rng: ChaCha8Rng,
     steps: u64,
     reporting_period_s: f64,
     parameter_scale_s: f64,
+    stop: Stop,
+    /// The state before an update that is under way, or that was given up.
+    before: Option<TrainerState>,
+}
+
+/// A warm start under way.
+#[derive(Default)]
+struct Lessons {
+    /// Environments that the teacher leads; none before the first lesson.
+    groups: Vec<Group>,
+    /// Decisions shown.
+    shown: u64,
 }
 
 /// What is needed besides the configuration to go on with a run exactly.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct TrainerState {
     /// Weights, as one vector.
     pub weights: Vec<f32>,
@@ -57,29 +74,17 @@ pub struct TrainerState {
     pub rng: ChaCha8Rng,
     /// The environments.
     pub slots: Vec<SlotState>,
+    /// The warm start, while it is not over.
+    pub lessons: Option<LessonsState>,
 }
 
-/// One update, for people and for plots.
-#[derive(Debug, Clone, Copy)]
-pub struct Report {
-    /// Environment steps taken so far.
-    pub steps: u64,
-    /// Episodes that ended during the update.
-    pub episodes: usize,
-    /// Mean reward of these episodes; NaN when there was none.
-    pub episode_return: f64,
-    /// Reward per orbit over all decisions of the update.
-    pub reward_per_orbit: f64,
-    /// Share of the attempts that succeeded.
-    pub success_rate: f64,
-    /// Mean transition time [s].
-    pub t_pre_s: f64,
-    /// Adam's step.
-    pub learning_rate: f64,
-    /// Weight of the KL penalty.
-    pub kl_coefficient: f64,
-    /// What the learner says.
-    pub update: UpdateStatistics,
+/// How far a warm start has come.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LessonsState {
+    /// Decisions shown.
+    pub shown: u64,
+    /// The environments that the teacher leads; none before the first lesson.
+    pub slots: Vec<SlotState>,
 }
 
 impl Trainer {
@@ -87,14 +92,16 @@ impl Trainer {
     ///
     /// # Errors
     /// A network that cannot be built, or an environment that cannot be made.
-    pub fn new(run: RunConfig, device: Device) -> Result<Trainer> {
+    pub fn new(run: RunConfig, device: Device) -> Result<Self> {
         let (network, layout, first) = build(&run)?;
         let mut rng = ChaCha8Rng::seed_from_u64(run.seed);
         rng.set_stream(STREAM_LEARNER);
         let parameters = Parameters::initial(&layout, &mut rng, device)?;
         let ppo = Ppo::new(run.ppo.clone(), layout.count(), device);
-        Ok(Trainer {
-            groups: groups(&run, &network, STREAM_ENVIRONMENTS, || environment(&run))?,
+        let stop = Stop::default();
+        Ok(Self {
+            groups: groups(&run, &network, STREAM_ENVIRONMENTS, &stop, || environment(&run))?,
+            lessons: run.warm_start.as_ref().map(|_| Lessons::default()),
             reporting_period_s: first.reporting_period_s(),
             parameter_scale_s: first.parameter_scale_s(),
             run,
@@ -104,6 +111,8 @@ impl Trainer {
             ppo,
             rng,
             steps: 0,
+            stop,
+            before: None,
         })
     }
 
@@ -112,7 +121,7 @@ impl Trainer {
     /// # Errors
     /// As [`Trainer::new`]; a state whose sizes are not the run's is a programming error of the
     /// caller, which [`crate::checkpoint`] rules out.
-    pub fn restore(run: RunConfig, device: Device, state: TrainerState) -> Result<Trainer> {
+    pub fn restore(run: RunConfig, device: Device, state: TrainerState) -> Result<Self> {
         let (network, layout, first) = build(&run)?;
         let tensor = |numbers: &[f32]| tch::Tensor::from_slice(numbers).to_device(device);
         let parameters = Parameters::from_flat(&layout, tensor(&state.weights))?;
@@ -121,10 +130,19 @@ impl Trainer {
         ppo.adam.second = tensor(&state.second);
         ppo.adam.steps = state.adam_steps;
         ppo.kl_coefficient = state.kl_coefficient;
-        let slots: Vec<Slot> =
-            state.slots.into_par_iter().map(|slot| Slot::restore(environment(&run)?, slot)).collect::<Result<_>>()?;
-        Ok(Trainer {
-            groups: grouped(slots, &run, &network),
+        let restored = |slots: Vec<SlotState>, lead: Lead| -> Result<Vec<Group>> {
+            let slots = slots.into_par_iter().map(|slot| Slot::restore(led(&run, lead)?, slot, lead));
+            Ok(grouped(slots.collect::<Result<_>>()?, &run, &network))
+        };
+        let groups = restored(state.slots, Lead::Policy)?;
+        let lessons = state.lessons.map(|it| {
+            let groups = if it.slots.is_empty() { Vec::new() } else { restored(it.slots, Lead::Teacher)? };
+            Ok::<_, TrainingError>(Lessons { groups, shown: it.shown })
+        });
+        let lessons = lessons.transpose()?;
+        Ok(Self {
+            groups,
+            lessons,
             reporting_period_s: first.reporting_period_s(),
             parameter_scale_s: first.parameter_scale_s(),
             run,
@@ -134,6 +152,8 @@ impl Trainer {
             ppo,
             rng: state.rng,
             steps: state.steps,
+            stop: Stop::default(),
+            before: None,
         })
     }
 
@@ -141,10 +161,10 @@ impl Trainer {
     ///
     /// # Errors
     /// As [`checkpoint::load`] and [`Trainer::restore`].
-    pub fn resume(run: RunConfig, path: &Path, device: Device) -> Result<Trainer> {
+    pub fn resume(run: RunConfig, path: &Path, device: Device) -> Result<Self> {
         let (_, layout, _) = build(&run)?;
         let state = checkpoint::load(path, &run, &layout)?;
-        Trainer::restore(run, device, state)
+        Self::restore(run, device, state)
     }
 
     /// Takes the weights of a policy or checkpoint of the same network and observation, and nothing else of it.
@@ -158,40 +178,81 @@ impl Trainer {
         Ok(())
     }
 
-    /// Learns from the teacher, if the run has one, before PPO begins: `each` is given every batch's report, whose
-    /// `surrogate` is the mean log-likelihood of the teacher's actions. Environments of their own are used, so what PPO
-    /// experiences afterwards does not depend on how long this took.
+    /// Updates end with [`TrainingError::Stopped`] soon after this wish is uttered; [`Trainer::state`] stays what it was
+    /// before the update.
+    pub fn stop_on(&mut self, stop: Stop) {
+        self.stop = stop;
+    }
+
+    /// Learns from the teacher to the end of the warm start, if the run has one: `each` is given every batch's report.
     ///
     /// # Errors
-    /// As [`Trainer::advance`]; a teacher that cannot be made.
+    /// As [`Trainer::lesson`].
     pub fn warm_start(&mut self, mut each: impl FnMut(&Report)) -> Result<()> {
-        let Some(config) = self.run.warm_start.clone() else {
-            return Ok(());
-        };
-        let mut groups = groups(&self.run, &self.network, STREAM_LESSONS, || {
-            Ok(match &self.run.environment {
-                EnvironmentConfig::Toy(toy) => Box::new(Toy::new(toy.tokens)),
-                EnvironmentConfig::Strips(strips) => {
-                    Box::new(Strips::new(strips)?.with_teacher(config.teacher.clone())?)
-                }
-            })
-        })?;
-        let mut shown = 0;
-        while shown < config.decisions {
-            let segments = self.collect(&mut groups, Lead::Teacher)?;
-            let learning_rate = config.learning_rate * (1.0 - 0.9 * shown as f64 / config.decisions as f64);
-            let update = self.update(&segments, Aim::Imitate, learning_rate)?;
-            shown += segments.iter().map(|it| it.choice.len() as u64).sum::<u64>();
-            each(&Report { steps: shown, ..self.report(&segments, learning_rate, update) });
+        while let Some(report) = self.lesson()? {
+            each(&report);
         }
-        self.ppo.adam = Adam::new(self.layout.count(), self.parameters.flat.device());
         Ok(())
     }
 
-    /// What must be saved to go on later.
+    /// Shows one batch of the teacher's decisions and learns from it; `None` when the warm start is over or there is
+    /// none. The report's `steps` are the decisions shown, its `surrogate` is the mean log-likelihood of the teacher's
+    /// actions. Environments of their own are used, so what PPO experiences afterwards does not depend on how long this
+    /// took.
+    ///
+    /// # Errors
+    /// As [`Trainer::advance`]; a teacher that cannot be made.
+    pub fn lesson(&mut self) -> Result<Option<Report>> {
+        let (Some(_), Some(config)) = (&self.lessons, self.run.warm_start.clone()) else {
+            return Ok(None);
+        };
+        self.as_one(|trainer| trainer.teach(&config)).map(Some)
+    }
+
+    fn teach(&mut self, config: &WarmStartConfig) -> Result<Report> {
+        let Lessons { mut groups, shown } = self.lessons.take().unwrap_or_default();
+        if groups.is_empty() {
+            groups =
+                self::groups(&self.run, &self.network, STREAM_LESSONS, &self.stop, || led(&self.run, Lead::Teacher))?;
+        }
+        let segments = self.collect(&mut groups, Lead::Teacher)?;
+        let learning_rate = config.learning_rate * (1.0 - 0.9 * shown as f64 / config.decisions as f64);
+        let update = self.update(&segments, Aim::Imitate, learning_rate)?;
+        let shown = shown + decisions(&segments);
+        if shown < config.decisions {
+            self.lessons = Some(Lessons { groups, shown });
+        } else {
+            self.ppo.adam = Adam::new(self.layout.count(), self.parameters.flat.device());
+        }
+        Ok(Report { steps: shown, ..self.report(&segments, learning_rate, update) })
+    }
+
+    /// Does all of something or leaves the state what it was.
+    fn as_one<T>(&mut self, act: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.before.is_some() {
+            return Err(TrainingError::Stopped);
+        }
+        self.before = Some(self.state()?);
+        let outcome = act(self)?;
+        self.before = None;
+        Ok(outcome)
+    }
+
+    /// What must be saved to go on later. While an update is under way, and after one that failed or was stopped, this is
+    /// the state before it; such a trainer does not go on, one restored from this state does.
+    ///
+    /// # Errors
+    /// What libtorch refuses.
     pub fn state(&self) -> Result<TrainerState> {
-        let slots = self.groups.iter().flat_map(|group| group.slots());
-        Ok(TrainerState {
+        self.present().map(Cow::into_owned)
+    }
+
+    /// As [`Trainer::state`], without a copy where there is one already.
+    pub(crate) fn present(&self) -> Result<Cow<'_, TrainerState>> {
+        if let Some(before) = &self.before {
+            return Ok(Cow::Borrowed(before));
+        }
+        Ok(Cow::Owned(TrainerState {
             weights: crate::rollout::to_vec(&self.parameters.flat)?,
             first: crate::rollout::to_vec(&self.ppo.adam.first)?,
             second: crate::rollout::to_vec(&self.ppo.adam.second)?,
@@ -199,45 +260,63 @@ impl Trainer {
             kl_coefficient: self.ppo.kl_coefficient,
             steps: self.steps,
             rng: self.rng.clone(),
-            slots: slots.map(Slot::state).collect(),
-        })
+            slots: slot_states(&self.groups),
+            lessons: self.lessons.as_ref().map(|it| LessonsState { shown: it.shown, slots: slot_states(&it.groups) }),
+        }))
     }
 
     /// The run.
+    #[must_use]
     pub fn run(&self) -> &RunConfig {
         &self.run
     }
 
     /// Names and shapes of the weights.
+    #[must_use]
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
     /// The network's structure.
+    #[must_use]
     pub fn network(&self) -> &Network {
         &self.network
     }
 
     /// Environment steps taken.
+    #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
+    /// Decisions that the warm start has shown; `None` once it is over, and without one.
+    #[must_use]
+    pub fn lessons_shown(&self) -> Option<u64> {
+        match &self.before {
+            Some(before) => before.lessons.as_ref().map(|it| it.shown),
+            None => self.lessons.as_ref().map(|it| it.shown),
+        }
+    }
+
     /// Whether the run has taken all its steps.
+    #[must_use]
     pub fn is_finished(&self) -> bool {
         self.steps >= self.run.steps
     }
 
-    /// Gathers one batch and learns from it.
+    /// Gathers one batch and learns from it. A warm start is over then.
     ///
     /// # Errors
-    /// Numbers that are not finite, with the step; an environment that fails.
+    /// Numbers that are not finite, with the step; an environment that fails; [`TrainingError::Stopped`].
     pub fn advance(&mut self) -> Result<Report> {
-        let segments = self.gather()?;
-        let learning_rate = self.learning_rate();
-        let update = self.learn(&segments)?;
-        self.steps += segments.iter().map(|it| it.choice.len() as u64).sum::<u64>();
-        Ok(self.report(&segments, learning_rate, update))
+        self.lessons = None;
+        self.as_one(|trainer| {
+            let segments = trainer.gather()?;
+            let learning_rate = trainer.learning_rate();
+            let update = trainer.learn(&segments)?;
+            trainer.steps += decisions(&segments);
+            Ok(trainer.report(&segments, learning_rate, update))
+        })
     }
 
     /// Adam's present step.
@@ -248,17 +327,23 @@ impl Trainer {
     }
 
     /// Learns from one batch.
+    ///
+    /// # Errors
+    /// As [`Ppo::update`].
     pub fn learn(&mut self, segments: &[Segment]) -> Result<UpdateStatistics> {
         self.update(segments, Aim::Improve, self.learning_rate())
     }
 
     fn update(&mut self, segments: &[Segment], aim: Aim, learning_rate: f64) -> Result<UpdateStatistics> {
         let (network, parameters) = (&self.network, &mut self.parameters);
-        let lesson = Lesson { segments, aim, learning_rate };
-        self.ppo.update(network, parameters, lesson, &mut self.rng, self.steps)
+        let lesson = Lesson { segments, aim, learning_rate, step: self.steps, stop: &self.stop };
+        self.ppo.update(network, parameters, lesson, &mut self.rng)
     }
 
     /// Steps all environments for one batch.
+    ///
+    /// # Errors
+    /// As [`Group::collect`].
     pub fn gather(&mut self) -> Result<Vec<Segment>> {
         let mut groups = std::mem::take(&mut self.groups);
         let segments = self.collect(&mut groups, Lead::Policy);
@@ -267,8 +352,12 @@ impl Trainer {
     }
 
     fn collect(&self, groups: &mut [Group], lead: Lead) -> Result<Vec<Segment>> {
-        let steps = self.run.steps_per_environment();
-        let discount = Discount { gamma: self.run.ppo.gamma, lambda: self.run.ppo.lambda };
+        let course = Course {
+            steps: self.run.steps_per_environment(),
+            discount: Discount { gamma: self.run.ppo.gamma, lambda: self.run.ppo.lambda },
+            lead,
+            stop: &self.stop,
+        };
         let device = self.parameters.flat.device();
         let network = &self.network;
         let actors: Vec<Actor> =
@@ -276,7 +365,7 @@ impl Trainer {
         groups
             .par_iter_mut()
             .zip(actors)
-            .map(|(group, actor)| group.collect(&actor, steps, discount, lead))
+            .map(|(group, actor)| group.collect(&actor, &course))
             .collect::<Result<_>>()
             .map_err(|error| match error {
                 TrainingError::PolicyNotFinite { quantity } => TrainingError::NotFinite { quantity, step: self.steps },
@@ -305,37 +394,30 @@ impl Trainer {
     }
 }
 
-impl Report {
-    /// Everything but the steps under the names of plots; `speed` is in environment steps a second.
-    pub fn scalars(&self, speed: f64) -> [(&'static str, f64); 17] {
-        let update = &self.update;
-        [
-            ("return", self.episode_return),
-            ("reward_per_orbit", self.reward_per_orbit),
-            ("success_rate", self.success_rate),
-            ("t_pre_mean_s", self.t_pre_s),
-            ("kl", update.kl),
-            ("clip_fraction", update.clip_fraction),
-            ("entropy", update.entropy),
-            ("transition_entropy", update.transition_entropy),
-            ("explained_variance", update.explained_variance),
-            ("gradient_norm", update.gradient_norm),
-            ("surrogate", update.surrogate),
-            ("value_loss", update.value_loss),
-            ("epochs", update.epochs),
-            ("learning_rate", self.learning_rate),
-            ("kl_coefficient", self.kl_coefficient),
-            ("episodes", self.episodes as f64),
-            ("steps_per_s", speed),
-        ]
-    }
+fn decisions(segments: &[Segment]) -> u64 {
+    segments.iter().map(|it| it.choice.len() as u64).sum()
+}
+
+fn slot_states(groups: &[Group]) -> Vec<SlotState> {
+    groups.iter().flat_map(Group::slots).map(Slot::state).collect()
 }
 
 /// An environment of a run.
+///
+/// # Errors
+/// A setting that is out of range.
 pub fn environment(run: &RunConfig) -> Result<Box<dyn Environment>> {
-    Ok(match &run.environment {
-        EnvironmentConfig::Toy(toy) => Box::new(Toy::new(toy.tokens)),
-        EnvironmentConfig::Strips(strips) => Box::new(Strips::new(strips)?),
+    led(run, Lead::Policy)
+}
+
+/// An environment of a run, with the teacher of its warm start where that leads.
+fn led(run: &RunConfig, lead: Lead) -> Result<Box<dyn Environment>> {
+    Ok(match (&run.environment, &run.warm_start) {
+        (EnvironmentConfig::Toy(toy), _) => Box::new(Toy::new(toy.tokens)),
+        (EnvironmentConfig::Strips(strips), Some(warm_start)) if lead == Lead::Teacher => {
+            Box::new(Strips::new(strips)?.with_teacher(warm_start.teacher.clone())?)
+        }
+        (EnvironmentConfig::Strips(strips), _) => Box::new(Strips::new(strips)?),
     })
 }
 
@@ -351,10 +433,14 @@ fn groups(
     run: &RunConfig,
     network: &Network,
     first_stream: u64,
+    stop: &Stop,
     environment: impl Fn() -> Result<Box<dyn Environment>> + Sync,
 ) -> Result<Vec<Group>> {
     let streams = first_stream..first_stream + run.rollout.environments as u64;
-    let slot = |stream| Slot::new(environment()?, run.seed, stream, run.rollout.stagger);
+    let slot = |stream| {
+        stop.check()?;
+        Slot::new(environment()?, run.seed, stream, run.rollout.stagger)
+    };
     let slots = streams.into_par_iter().map(slot).collect::<Result<_>>()?;
     Ok(grouped(slots, run, network))
 }

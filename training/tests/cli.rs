@@ -1,100 +1,11 @@
 //! `swath-train` as a user runs it: training, stopping, resuming, evaluating, and bad input.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::time::Duration;
+use std::process::Command;
 
 use serde_json::Value;
-use tempfile::TempDir;
 
-const TOY: &str = r#"
-name = "toy"
-steps = 400
-checkpoint_every = 100
-environment = { kind = "toy", tokens = 4 }
-network = { kind = "hop-ppo-mlp", encoder = [8], discrete = [8], continuous = [8], critic = [8] }
-rollout = { environments = 4, group = 2, stagger = 15 }
-ppo = { batch = 40, minibatch = 20, epochs = 2, learning_rate = 1e-3, learning_rate_end = 1e-4 }
-"#;
-
-const STRIPS: &str = r#"
-name = "strips"
-steps = 60
-[environment]
-kind = "strips"
-episode = { orbits = 0.5, scenario = { count = [300, 300] } }
-[network]
-kind = "hop-ppo"
-dim = 8
-heads = 2
-layers = 1
-feed_forward = 8
-head = "pointer"
-discrete = [8]
-continuous = [8]
-critic = [8]
-[rollout]
-environments = 2
-group = 1
-[ppo]
-batch = 30
-minibatch = 30
-epochs = 1
-"#;
-
-/// A folder with a run's TOML.
-struct Case {
-    folder: TempDir,
-}
-
-impl Case {
-    fn new(run: &str) -> Case {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("run.toml"), run).unwrap();
-        Case { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn train(&self, more: &[&str]) -> Output {
-        let mut args = vec!["train", "--config", "run.toml", "--out", "out", "--threads", "1"];
-        args.extend(more);
-        self.run(&args)
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        self.command(args).output().unwrap()
-    }
-
-    fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_swath-train"));
-        command.args(args).current_dir(self.folder.path());
-        command
-    }
-
-    fn refused(&self, output: &Output, texts: &[&str]) {
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{error}");
-        for text in texts {
-            assert!(error.contains(text), "{text} is not in: {error}");
-        }
-    }
-}
-
-fn succeeded(output: &Output) {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-}
-
-fn checkpoints(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries.map(|it| it.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
+use crate::case::{Case, STRIPS, TOY, checkpoints, succeeded};
 
 #[test]
 fn a_run_in_two_parts_ends_with_the_same_policy_and_progress_as_in_one() {
@@ -171,26 +82,6 @@ fn tensorboard_reads_the_event_files() {
 }
 
 #[test]
-fn ctrl_c_saves_and_the_run_goes_on_from_there() {
-    let case = Case::new(&TOY.replace("steps = 400", "steps = 1_000_000_000"));
-    let mut command = case.command(&["train", "--config", "run.toml", "--out", "out", "--threads", "1"]);
-    let mut child = command.stderr(Stdio::null()).spawn().unwrap();
-    let progress = case.path("out/toy-seed0/progress.jsonl");
-    while std::fs::read_to_string(&progress).unwrap_or_default().is_empty() {
-        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    let id = libc::pid_t::try_from(child.id()).unwrap();
-    // SAFETY: the process is ours and has not been waited for.
-    unsafe { libc::kill(id, libc::SIGINT) };
-    assert!(child.wait().unwrap().success());
-    let saved = checkpoints(&case.path("out/toy-seed0/checkpoints"));
-    let last = std::fs::read_to_string(&progress).unwrap().lines().count() as u64 * 40;
-    assert_eq!(saved.last().unwrap(), &format!("step-{last:012}.safetensors"));
-    succeeded(&case.train(&["--resume", "--stop-after", &(last + 40).to_string()]));
-}
-
-#[test]
 fn a_full_disk_leaves_the_last_good_checkpoint() {
     let case = Case::new(TOY);
     succeeded(&case.train(&["--stop-after", "80"]));
@@ -263,6 +154,10 @@ fn planners_are_compared_on_the_same_missions_whatever_the_threads() {
     case.refused(&wrong, &["it holds a hop-ppo policy, not h-ppo"]);
     let missing = case.run(&["evaluate", "--planner", "hop-ppo:none", "--episodes", "1"]);
     case.refused(&missing, &["cannot read none"]);
+    let other = case.run(&["evaluate", "--planner", "hop-ppo:run.toml", "--episodes", "1"]);
+    case.refused(&other, &["run.toml cannot be used here: it is no policy and no checkpoint"]);
+    let checkpoint = case.train(&["--resume", "out/strips-seed0/policy.safetensors"]);
+    case.refused(&checkpoint, &["policy.safetensors cannot be used here: it is a policy, not a checkpoint"]);
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! Learning reaches the known optimum of a tiny problem.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use swath_training::config::RunConfig;
 use swath_training::distribution::{best_choice, squash};
 use swath_training::environment::{Action, Environment, Progress};

@@ -1,7 +1,5 @@
 //! Every network against the same calculation written out in plain loops and double precision.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::HashMap;
 
 use approx::assert_abs_diff_eq;
@@ -25,7 +23,7 @@ type Tokens = Vec<Row>;
 struct Weights(HashMap<String, (Vec<i64>, Vec<f64>)>);
 
 impl Weights {
-    fn new(layout: &Layout, parameters: &Parameters) -> Weights {
+    fn new(layout: &Layout, parameters: &Parameters) -> Self {
         let flat = to_vec(&parameters.flat).unwrap();
         let mut numbers = flat.into_iter().map(f64::from);
         let named = layout.entries().map(|(name, shape)| {
@@ -33,7 +31,7 @@ impl Weights {
             let values = numbers.by_ref().take(count).collect();
             (name.to_owned(), (shape.to_vec(), values))
         });
-        Weights(named.collect())
+        Self(named.collect())
     }
 
     fn vector(&self, name: &str) -> &[f64] {
@@ -136,7 +134,7 @@ struct Case {
 }
 
 impl Case {
-    fn new(config: &NetworkConfig) -> Case {
+    fn new(config: &NetworkConfig) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (network, layout) = Network::new(config, SHAPE, 120.0).unwrap();
         let parameters = Parameters::initial(&layout, &mut rng, Device::Cpu).unwrap();
@@ -149,7 +147,7 @@ impl Case {
             let valid = (0..SHAPE.tokens).map(|token| token < SHAPE.tokens - row);
             (tokens.collect(), valid.collect())
         });
-        Case { observations: observations.collect(), weights: Weights::new(&layout, &parameters), network, parameters }
+        Self { observations: observations.collect(), weights: Weights::new(&layout, &parameters), network, parameters }
     }
 
     fn seen(&self) -> Observations {

@@ -1,26 +1,23 @@
 //! A policy file flies as it was trained: same observation, same action.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
-use swath_sim::env::{Env, EpisodeConfig, Totals};
+use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Planner};
-use swath_training::TrainingError;
-use swath_training::checkpoint;
+use swath_sim::task::Totals;
 use swath_training::config::{EnvironmentConfig, RunConfig};
 use swath_training::distribution::{best_choice, squash};
 use swath_training::environment::{Action, Environment};
 use swath_training::network::Observations;
-use swath_training::planners;
 use swath_training::policy::{LearnedPlanner, Policy};
 use swath_training::rollout::{observations, to_vec};
 use swath_training::store::Content;
 use swath_training::strips::{Strips, decision};
 use swath_training::trainer::Trainer;
+use swath_training::{TrainingError, checkpoint, planners};
 use tch::{Device, Tensor};
 
 fn run(file: &str) -> RunConfig {

@@ -1,13 +1,13 @@
 //! A run that was stopped and resumed equals the run that was not, bit for bit.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::Path;
 
 use rayon::ThreadPoolBuilder;
 use swath_training::TrainingError;
 use swath_training::checkpoint;
 use swath_training::config::RunConfig;
+use swath_training::stop::Stop;
+use swath_training::store::Content;
 use swath_training::trainer::Trainer;
 use tch::Device;
 
@@ -75,6 +75,75 @@ fn resumed_equals_uninterrupted(text: &str) {
         assert_eq!(whole.steps(), resumed.steps());
         assert_eq!(bytes(&whole, folder.path()), bytes(&resumed, folder.path()));
     });
+}
+
+/// Strips with a warm start in which the teacher sometimes waits, and remembers what failed.
+fn taught() -> String {
+    let strips = STRIPS.replace("orbits = 0.2", "orbits = 0.6").replace("[300, 500]", "[100, 150]");
+    format!("{strips}[warm_start]\ndecisions = 200\nlearning_rate = 1e-3\nteacher = \"lookahead\"\n")
+}
+
+#[test]
+fn a_warm_start_resumed_anywhere_is_bit_equal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("middle.safetensors");
+    for run_text in [taught(), format!("{TOY}warm_start = {{ decisions = 400, learning_rate = 1e-3 }}\n")] {
+        let run = || run(&run_text);
+        let mut whole = Trainer::new(run(), Device::Cpu).unwrap();
+        let lessons = std::iter::from_fn(|| whole.lesson().unwrap()).count();
+        assert!(lessons > 4);
+        advance(&mut whole, 2);
+        for begun in [0, 1, lessons - 1, lessons] {
+            let mut trainer = Trainer::new(run(), Device::Cpu).unwrap();
+            (0..begun).for_each(|_| assert!(trainer.lesson().unwrap().is_some()));
+            checkpoint::save(&trainer, &path).unwrap();
+            let mut resumed = Trainer::resume(run(), &path, Device::Cpu).unwrap();
+            assert_eq!(resumed.lessons_shown(), trainer.lessons_shown());
+            assert_eq!(resumed.lessons_shown().is_none(), begun == lessons);
+            let left = std::iter::from_fn(|| resumed.lesson().unwrap()).count();
+            assert_eq!(begun + left, lessons);
+            advance(&mut resumed, 2);
+            assert_eq!(bytes(&whole, folder.path()), bytes(&resumed, folder.path()), "after {begun} lessons");
+        }
+    }
+}
+
+#[test]
+fn a_trainer_that_is_stopped_keeps_what_it_was_before_the_update() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("{TOY}warm_start = {{ decisions = 60, learning_rate = 1e-3 }}\n");
+    let mut trainer = Trainer::new(run(&text), Device::Cpu).unwrap();
+    let stop = Stop::default();
+    trainer.stop_on(stop.clone());
+    for lesson in [true, false] {
+        let before = bytes(&trainer, folder.path());
+        stop.request();
+        let stopped = if lesson { trainer.lesson().map(|_| ()) } else { trainer.advance().map(|_| ()) };
+        assert!(matches!(stopped, Err(TrainingError::Stopped)));
+        assert_eq!(bytes(&trainer, folder.path()), before);
+        assert!(matches!(trainer.advance(), Err(TrainingError::Stopped)), "it does not go on half-way");
+        assert_eq!(trainer.lessons_shown(), lesson.then_some(0));
+        trainer = Trainer::restore(run(&text), Device::Cpu, trainer.state().unwrap()).unwrap();
+        trainer.warm_start(|_| {}).unwrap();
+        trainer.stop_on(stop.clone());
+    }
+}
+
+#[test]
+fn a_checkpoint_within_a_warm_start_is_not_taken_for_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lesson.safetensors");
+    let text = format!("{TOY}warm_start = {{ decisions = 400, learning_rate = 1e-3 }}\n");
+    let mut trainer = Trainer::new(run(&text), Device::Cpu).unwrap();
+    trainer.lesson().unwrap();
+    checkpoint::save(&trainer, &path).unwrap();
+    let version = |path: &Path| checkpoint::header(&Content::read(path).unwrap(), path).unwrap().version;
+    assert_eq!((version(&path), checkpoint::file_name(&trainer).as_str()), (2, "lesson-000000000060.safetensors"));
+    checkpoint::save_policy(&trainer, &path).unwrap();
+    assert_eq!(version(&path), 1, "a policy is a policy");
+    trainer.warm_start(|_| {}).unwrap();
+    checkpoint::save(&trainer, &path).unwrap();
+    assert_eq!((version(&path), checkpoint::file_name(&trainer).as_str()), (1, "step-000000000000.safetensors"));
 }
 
 #[test]

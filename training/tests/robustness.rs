@@ -1,5 +1,4 @@
 //! Evaluation on satellites that differ from their model, with requests that come in flight, and of ground plans.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use std::process::{Command, Output};
 

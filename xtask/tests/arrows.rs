@@ -14,7 +14,24 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-ros", &["swath-msgs"]),
     ("swath-bags", &["swath-msgs", "swath-ros"]),
     ("swath-training", &["swath-sim"]),
-    ("swath-nodes", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-training"]),
+    ("swath-mission", &["swath-sim", "swath-msgs"]),
+    ("swath-node", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission"]),
+    ("swath-space", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-node"]),
+    ("swath-ground", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
+    (
+        "swath-nodes",
+        &[
+            "swath-sim",
+            "swath-msgs",
+            "swath-ros",
+            "swath-bags",
+            "swath-mission",
+            "swath-node",
+            "swath-space",
+            "swath-ground",
+            "swath-training",
+        ],
+    ),
     ("xtask", &[]),
 ];
 
@@ -25,6 +42,10 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-ros", &["tch", "torch-sys", "mcap"]),
     ("swath-bags", &["tch", "torch-sys"]),
     ("swath-training", &["ros2-client", "rustdds", "mcap"]),
+    ("swath-mission", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
+    ("swath-node", &["tch", "torch-sys", "mcap", "rusqlite"]),
+    ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
+    ("swath-ground", &["tch", "torch-sys"]),
     ("xtask", &["tch", "torch-sys", "ros2-client", "rustdds"]),
 ];
 

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
-use swath_nodes::record::Summary;
+use swath_mission::outcome::Summary;
 
 /// Each figure is the median of this many missions.
 const RUNS: usize = 5;

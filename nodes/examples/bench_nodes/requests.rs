@@ -5,15 +5,16 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
+use swath_ground::requests::store::Store;
+use swath_mission::file::Mission;
+use swath_mission::orders::geojson;
+use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::requests::logic::RequestLogic;
 use swath_msgs::swath_msgs as msg;
-use swath_nodes::mission::Mission;
-use swath_nodes::requests::logic::RequestLogic;
-use swath_nodes::requests::store::Store;
-use swath_nodes::requests_file::{self, NamedRequest};
-use swath_nodes::to_msg::requests::strip_request;
+use swath_node::orders::strip_request;
 use swath_ros::{Client, Environment, Node, RosArgs, graph};
-use swath_sim::strip::StripRequest;
 use swath_sim::time::Tick;
+use swath_sim::world::strip::StripRequest;
 
 use super::{anonymous_kb, median};
 
@@ -121,7 +122,7 @@ fn named(number: u32) -> NamedRequest {
 /// Seconds for `swath strips submit` from its start to its end.
 fn submit_file(swath: &Path, folder: &Path) -> Result<f64> {
     let file: PathBuf = folder.join("strips.geojson");
-    requests_file::write(&file, &(0..FILE).map(named).collect::<Vec<_>>())?;
+    geojson::write(&file, &(0..FILE).map(named).collect::<Vec<_>>())?;
     // The node has come up by then: what is measured is the submission.
     let ask = || local(swath).args(["strips", "list", "--limit", "1"]).stdout(Stdio::null()).status();
     ensure!(ask()?.success(), "the request manager does not answer");
@@ -177,7 +178,7 @@ fn next_n(mission: &Path, store: &Path) -> Result<f64> {
     let horizon = mission.horizon(&model);
     let snapshot = Store::open_read_only(store)?.snapshot()?;
     let mut logic = RequestLogic::new(model, &mission.initial(), horizon, mission.rules());
-    logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress)?;
+    logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled)?;
     ensure!(logic.len() == MANY as usize, "{} strips are held", logic.len());
     let mut longest: f64 = 0.0;
     for (task, tick) in (0..horizon.0).step_by(250).enumerate() {

@@ -1,17 +1,22 @@
 //! The thread of a node that watches the domain and answers for its parameters.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use futures_core::Stream as _;
-use rustdds::{DomainParticipant, DomainParticipantStatusListener, StatusEvented as _};
+use rustdds::{DomainParticipantStatusListener, RTPSEntity as _, StatusEvented as _};
 
-use crate::endpoint::RawSubscription;
+use crate::dds::Dds;
+use crate::endpoint::{Gid, RawSample, RawSubscription};
 use crate::error::RosError;
+use crate::health::{ASK_EVERY, Ailment, Health};
+use crate::members::Identity;
+use crate::message::decode_as;
+use crate::minder::Minder;
 use crate::param_services::ParameterServices;
 use crate::roster::Roster;
 use crate::signal::{Signal, lock};
@@ -22,38 +27,62 @@ pub(crate) struct Background {
     thread: Option<JoinHandle<()>>,
 }
 
+/// Why a node has to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// An older node of the same name has turned up.
+    Namesake,
+    /// RustDDS does not answer any more.
+    Deaf,
+}
+
+/// What the thread listens to.
+pub(crate) struct Hearing {
+    /// What DDS notices.
+    pub(crate) listener: DomainParticipantStatusListener,
+    /// What the other processes say of their nodes.
+    pub(crate) announcements: RawSubscription,
+    /// Who the other processes say that they are.
+    pub(crate) identities: RawSubscription,
+}
+
 struct Shared {
     signal: Signal,
     node_signal: Signal,
     stop: AtomicBool,
-    must_yield: AtomicBool,
+    fault: Mutex<Option<Fault>>,
+    dds: Arc<Dds>,
     roster: Arc<Roster>,
+    minder: Arc<Minder>,
     services: Mutex<Option<ParameterServices>>,
 }
 
 impl Background {
-    /// Starts the thread. `announcements` is the subscription to what the other processes say of
-    /// their nodes; `node_signal` is raised when the node has to go.
+    /// Starts the thread; `node_signal` is raised when it has become known who counts, and when the node has to go.
     pub(crate) fn start(
-        participant: &DomainParticipant,
+        mut hearing: Hearing,
+        dds: Arc<Dds>,
         roster: Arc<Roster>,
-        mut announcements: RawSubscription,
+        minder: Arc<Minder>,
         node_signal: Signal,
     ) -> Result<Self, RosError> {
         let signal = Signal::new();
-        announcements.set_signal(&signal);
+        hearing.announcements.set_signal(&signal);
+        hearing.identities.set_signal(&signal);
         let shared = Arc::new(Shared {
             signal,
             node_signal,
             stop: AtomicBool::new(false),
-            must_yield: AtomicBool::new(false),
+            fault: Mutex::new(None),
+            dds,
             roster,
+            minder,
             services: Mutex::new(None),
         });
-        let (listener, running) = (participant.status_listener(), Arc::clone(&shared));
+        let running = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("ros".to_owned())
-            .spawn(move || running.run(&listener, &announcements))
+            .spawn(move || running.run(hearing))
             .map_err(|source| RosError::System { what: "no thread for the node", source })?;
         Ok(Self { shared, thread: Some(thread) })
     }
@@ -65,9 +94,9 @@ impl Background {
         self.shared.signal.raise();
     }
 
-    /// Whether an older node of the same name has turned up.
-    pub(crate) fn must_yield(&self) -> bool {
-        self.shared.must_yield.load(Ordering::Relaxed)
+    /// Why the node has to end, if it has to.
+    pub(crate) fn fault(&self) -> Option<Fault> {
+        *lock(&self.shared.fault)
     }
 }
 
@@ -84,20 +113,70 @@ impl Drop for Background {
 }
 
 impl Shared {
-    fn run(&self, listener: &DomainParticipantStatusListener, announcements: &RawSubscription) {
+    fn run(&self, mut hearing: Hearing) {
+        let mut health = Health::new();
         while !self.stop.load(Ordering::Relaxed) {
-            self.take_events(listener);
-            self.take_announcements(announcements);
-            if self.roster.must_yield() && !self.must_yield.swap(true, Ordering::Relaxed) {
+            self.take_events(&hearing.listener);
+            let before = self.roster.revision();
+            self.take_all(&hearing.announcements, |sample| self.roster.note_nodes(&sample.cdr));
+            self.take_all(&hearing.identities, |sample| self.note_identity(sample));
+            if self.roster.revision() != before {
+                // Messages may wait for their writer to become known.
                 self.node_signal.raise();
+            }
+            if self.roster.must_yield() {
+                self.fail(Fault::Namesake);
             }
             if let Some(services) = lock(&self.services).as_ref()
                 && let Err(error) = services.serve()
             {
                 tracing::warn!("parameters: {error}");
             }
-            self.signal.wait(Duration::from_secs(1));
+            if let Some(ailment) = health.examine(&self.minder, &self.roster) {
+                match self.renew(ailment) {
+                    Ok(listener) => hearing.listener = listener,
+                    Err(fault) => self.fail(fault),
+                }
+                health = Health::after(health);
+            }
+            self.signal.wait(ASK_EVERY);
         }
+    }
+
+    fn fail(&self, fault: Fault) {
+        let mut known = lock(&self.fault);
+        if known.is_none() {
+            *known = Some(fault);
+            self.node_signal.raise();
+        }
+    }
+
+    /// Gives the node another participant, in whose place all its endpoints go on.
+    fn renew(&self, ailment: Ailment) -> Result<DomainParticipantStatusListener, Fault> {
+        if ailment == Ailment::Incurable {
+            return Err(Fault::Deaf);
+        }
+        // What has panicked once may do so again when it is taken apart.
+        let renewed = catch_unwind(AssertUnwindSafe(|| {
+            self.roster.retire();
+            self.dds.renew()
+        }));
+        let renewed = match renewed {
+            Ok(Ok(renewed)) => renewed,
+            Ok(Err(error)) => {
+                tracing::error!("DDS cannot be started anew: {error}");
+                return Err(Fault::Deaf);
+            }
+            Err(_) => return Err(Fault::Deaf),
+        };
+        let listener = renewed.participant.status_listener();
+        self.roster.renew(Gid::from(renewed.participant.guid()), &renewed.gids);
+        self.minder.turn_to(&renewed.participant);
+        renewed.resume();
+        self.roster.announce();
+        self.roster.note_renewal(ailment.reason());
+        self.node_signal.raise();
+        Ok(listener)
     }
 
     fn take_events(&self, listener: &DomainParticipantStatusListener) {
@@ -109,13 +188,20 @@ impl Shared {
         }
     }
 
-    fn take_announcements(&self, announcements: &RawSubscription) {
+    fn take_all(&self, subscription: &RawSubscription, mut note: impl FnMut(RawSample)) {
         loop {
-            match announcements.take() {
-                Ok(Some(sample)) => self.roster.note_nodes(&sample.cdr),
+            match subscription.take() {
+                Ok(Some(sample)) => note(sample),
                 Ok(None) => return,
                 Err(error) => tracing::debug!("{error}"),
             }
+        }
+    }
+
+    fn note_identity(&self, sample: RawSample) {
+        match decode_as::<Identity>("Identity", &sample.cdr) {
+            Ok(identity) => self.roster.note_identity(sample.info.writer, identity),
+            Err(error) => tracing::debug!("another process introduces itself wrongly: {error}"),
         }
     }
 }

@@ -1,67 +1,32 @@
 //! Writers and readers of CDR bytes: what recorder and player use, and what typed topics are made of.
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::task::{Wake, Waker};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use rustdds::bytes::Bytes;
-use rustdds::no_key::{
-    DataWriter, Decode, DefaultDecoder, DeserializedCacheChange, DeserializerAdapter, SerializerAdapter,
-    SimpleDataReader,
-};
-use rustdds::{GUID, RTPSEntity as _, RepresentationIdentifier, SampleIdentity, Timestamp, WriteOptionsBuilder};
+use rustdds::dds::{ReadError, WriteError};
+use rustdds::no_key::DeserializedCacheChange;
+use rustdds::{GUID, SampleIdentity, Timestamp, WriteOptionsBuilder};
 
+use crate::cdr::Cdr;
 use crate::error::RosError;
+use crate::notices::Trouble;
+use crate::qos::SEND_TIMEOUT;
 use crate::roster::{Direction, Roster};
+use crate::rtps::Prefix;
 use crate::signal::{Signal, lock};
-
-/// A message as it travels: four bytes that name the encoding, then the encoded message.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cdr {
-    bytes: Bytes,
-}
-
-/// Bytes of the encapsulation header.
-pub const HEADER_LENGTH: usize = 4;
-
-const LITTLE_ENDIAN: [u8; HEADER_LENGTH] = [0, 1, 0, 0];
-const BIG_ENDIAN: [u8; HEADER_LENGTH] = [0, 0, 0, 0];
-
-impl Cdr {
-    /// The bytes, header included, as bags store them.
-    pub fn as_bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// Takes bytes, header included.
-    pub fn from_bytes(bytes: impl Into<Bytes>) -> Self {
-        Self { bytes: bytes.into() }
-    }
-
-    /// The bytes after the header, if they are little-endian plain CDR.
-    pub(crate) fn little_endian(&self) -> Option<&[u8]> {
-        self.bytes.strip_prefix(&LITTLE_ENDIAN[..2]).and_then(|rest| rest.get(2..))
-    }
-
-    /// The bytes after the header, if they are big-endian plain CDR.
-    pub(crate) fn big_endian(&self) -> Option<&[u8]> {
-        self.bytes.strip_prefix(&BIG_ENDIAN[..2]).and_then(|rest| rest.get(2..))
-    }
-}
-
-/// Starts a little-endian message with room for a payload of the given length.
-pub(crate) fn header_with_room(payload: usize) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(HEADER_LENGTH + payload);
-    bytes.extend_from_slice(&LITTLE_ENDIAN);
-    bytes
-}
+use crate::slot::{Bell, ReaderSlot, WriterSlot};
 
 /// Identity of a writer or reader: 12 bytes of its process, 4 of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Gid(pub [u8; 16]);
+
+impl Gid {
+    /// The half that all endpoints of a process have in common.
+    pub(crate) fn prefix(self) -> Prefix {
+        std::array::from_fn(|index| self.0[index])
+    }
+}
 
 impl From<GUID> for Gid {
     fn from(guid: GUID) -> Self {
@@ -92,102 +57,58 @@ pub struct RawSample {
     pub info: SampleInfo,
 }
 
-/// The link between RustDDS and [`Cdr`].
-pub(crate) struct Adapter;
-
-impl DeserializerAdapter<Cdr> for Adapter {
-    type Error = Infallible;
-    type Decoded = Cdr;
-
-    fn supported_encodings() -> &'static [RepresentationIdentifier] {
-        &[
-            RepresentationIdentifier::CDR_LE,
-            RepresentationIdentifier::CDR_BE,
-            RepresentationIdentifier::XCDR2_LE,
-            RepresentationIdentifier::XCDR2_BE,
-            RepresentationIdentifier::D_CDR2_LE,
-            RepresentationIdentifier::D_CDR2_BE,
-        ]
-    }
-
-    fn transform_decoded(decoded: Cdr) -> Cdr {
-        decoded
-    }
-}
-
-#[derive(Clone)]
-pub(crate) struct Copier;
-
-impl Decode<'_, Cdr> for Copier {
-    type Error = Infallible;
-
-    fn decode_bytes(self, payload: &[u8], encoding: RepresentationIdentifier) -> Result<Cdr, Infallible> {
-        let [first, second] = encoding.to_bytes();
-        let mut bytes = Vec::with_capacity(HEADER_LENGTH + payload.len());
-        bytes.extend_from_slice(&[first, second, 0, 0]);
-        bytes.extend_from_slice(payload);
-        Ok(Cdr { bytes: bytes.into() })
-    }
-}
-
-impl DefaultDecoder<Cdr> for Adapter {
-    type Decoder = Copier;
-    const DECODER: Copier = Copier;
-}
-
-impl SerializerAdapter<Cdr> for Adapter {
-    type Error = Infallible;
-
-    fn output_encoding() -> RepresentationIdentifier {
-        RepresentationIdentifier::CDR_LE
-    }
-
-    fn to_bytes(cdr: &Cdr) -> Result<Bytes, Infallible> {
-        Ok(cdr.bytes.slice(HEADER_LENGTH.min(cdr.bytes.len())..))
-    }
-}
-
 /// Writes CDR bytes to a topic.
 pub struct RawPublisher {
-    pub(crate) writer: DataWriter<Cdr, Adapter>,
-    pub(crate) topic: String,
-    pub(crate) roster: Arc<Roster>,
+    slot: Arc<WriterSlot>,
+    topic: String,
+    roster: Arc<Roster>,
 }
 
 impl RawPublisher {
+    pub(crate) fn new(slot: Arc<WriterSlot>, topic: String, roster: Arc<Roster>) -> Self {
+        Self { slot, topic, roster }
+    }
+
     /// Sends a message of little-endian CDR bytes, encapsulation header included.
     ///
+    /// A reader that does not acknowledge thousands of samples is waited for: by a node of a mission until it is clear
+    /// that it lags, from then on it is not waited for any more; by any other node for [`crate::qos::SEND_TIMEOUT`].
+    ///
     /// # Errors
-    /// If the bytes are encoded in another way, or a reader has been lagging for
-    /// [`crate::qos::SEND_TIMEOUT`].
+    /// If the bytes are encoded in another way, or readers were waited for in vain.
     pub fn publish(&self, cdr: Cdr) -> Result<(), RosError> {
         self.send(cdr, None).map(|_| ())
     }
 
     pub(crate) fn send(&self, cdr: Cdr, related: Option<SampleIdentity>) -> Result<SampleIdentity, RosError> {
+        let failed = |reason: String| RosError::Send { topic: self.topic.clone(), reason };
         if cdr.little_endian().is_none() {
-            return Err(RosError::Send {
-                topic: self.topic.clone(),
-                reason: "only little-endian CDR can be sent".to_owned(),
-            });
+            return Err(failed("only little-endian CDR can be sent".to_owned()));
         }
-        let mut options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
-        if let Some(related) = related {
-            options = options.related_sample_identity(related);
+        let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
+        let options = options.related_sample_identity_opt(related).build();
+        let (start, mut cdr) = (Instant::now(), cdr);
+        loop {
+            // Each attempt waits for `qos::BLOCKING`.
+            match self.slot.write(cdr, options.clone()) {
+                Ok(identity) => return Ok(identity),
+                Err(WriteError::WouldBlock { data }) if start.elapsed() < SEND_TIMEOUT => {
+                    self.roster.let_go_readers(self.gid(), &self.topic);
+                    cdr = data;
+                }
+                Err(error) => return Err(failed(error.to_string())),
+            }
         }
-        self.writer
-            .write_with_options(cdr, options.build())
-            .map_err(|error| RosError::Send { topic: self.topic.clone(), reason: error.to_string() })
     }
 
     /// Waits until every reliable reader has all samples, and tells whether that is so.
     pub fn flush(&self, timeout: Duration) -> bool {
-        self.writer.wait_for_acknowledgments(timeout).unwrap_or(false)
+        self.slot.flush(timeout)
     }
 
     /// Readers that this writer sends to.
     pub fn matched(&self) -> usize {
-        self.roster.matched(self.writer.guid().into()).len()
+        self.roster.matched(self.gid()).len()
     }
 
     /// Fully qualified name of the topic.
@@ -195,9 +116,9 @@ impl RawPublisher {
         &self.topic
     }
 
-    /// The writer's identity.
+    /// The writer's identity; another one after RustDDS has been started anew.
     pub fn gid(&self) -> Gid {
-        self.writer.guid().into()
+        self.slot.gid()
     }
 }
 
@@ -209,83 +130,73 @@ impl Drop for RawPublisher {
 
 /// Reads CDR bytes from a topic.
 pub struct RawSubscription {
-    reader: SimpleDataReader<Cdr, Adapter>,
+    slot: Arc<ReaderSlot>,
     topic: String,
     roster: Arc<Roster>,
     bell: Arc<Bell>,
     losses: Mutex<Losses>,
 }
 
-/// What DDS rings when a sample comes.
-struct Bell {
-    /// Nothing was there when DDS was last asked, and it has not rung since.
-    quiet: AtomicBool,
-    signal: Signal,
-}
-
-impl Wake for Bell {
-    fn wake(self: Arc<Self>) {
-        self.wake_by_ref();
-    }
-
-    fn wake_by_ref(self: &Arc<Self>) {
-        self.quiet.store(false, Ordering::Release);
-        self.signal.raise();
-    }
-}
-
-impl Bell {
-    fn new(signal: &Signal) -> Arc<Self> {
-        Arc::new(Self { quiet: AtomicBool::new(false), signal: signal.clone() })
-    }
-}
-
 impl RawSubscription {
-    pub(crate) fn new(
-        reader: SimpleDataReader<Cdr, Adapter>,
-        topic: String,
-        roster: Arc<Roster>,
-        signal: &Signal,
-    ) -> Self {
-        Self { reader, topic, roster, bell: Bell::new(signal), losses: Mutex::default() }
+    pub(crate) fn new(slot: Arc<ReaderSlot>, topic: String, roster: Arc<Roster>, signal: &Signal) -> Self {
+        let bell = slot.hang(signal);
+        Self { slot, topic, roster, bell, losses: Mutex::default() }
     }
 
     /// The next sample, if there is one.
     ///
-    /// Once it has returned nothing, the next sample to come raises the node's [`Signal`].
+    /// Once it has returned nothing, the next sample to come raises the node's [`Signal`]. Samples of an unknown
+    /// encoding are passed over and counted (`Node::notices`).
     pub fn take(&self) -> Result<Option<RawSample>, RosError> {
         // A node that reads many topics asks them all whenever one has news: this makes it cheap.
-        if self.bell.quiet.load(Ordering::Acquire) {
+        if self.bell.is_quiet() {
             return Ok(None);
         }
         if let Some(sample) = self.try_take()? {
             return Ok(Some(sample));
         }
-        self.bell.quiet.store(true, Ordering::Release);
-        self.reader.set_waker(Some(Waker::from(Arc::clone(&self.bell))));
+        self.bell.wait();
+        self.slot.set_waker(&self.bell);
         // A sample may have come before the waker was set: look again.
         let sample = self.try_take()?;
         if sample.is_some() {
-            self.bell.quiet.store(false, Ordering::Release);
+            self.bell.expect();
         }
         Ok(sample)
     }
 
     fn try_take(&self) -> Result<Option<RawSample>, RosError> {
-        let sample = self
-            .reader
-            .try_take_one()
-            .map_err(|error| RosError::Receive { topic: self.topic.clone(), reason: error.to_string() })?;
-        Ok(sample.map(|change| {
-            let sample = raw_sample(change);
-            lock(&self.losses).note(&sample.info);
-            sample
-        }))
+        loop {
+            match self.slot.take() {
+                Ok(change) => {
+                    return Ok(change.map(|change| {
+                        let sample = raw_sample(change);
+                        lock(&self.losses).note(&sample.info);
+                        sample
+                    }));
+                }
+                // The reader has gone on to the next sample.
+                Err(ReadError::Deserialization { reason }) => self.note_unreadable(|| reason),
+                Err(error) => {
+                    return Err(RosError::Receive { topic: self.topic.clone(), reason: error.to_string() });
+                }
+            }
+        }
+    }
+
+    /// Counts a sample that is no message.
+    pub(crate) fn note_unreadable(&self, reason: impl FnOnce() -> String) {
+        self.roster.notices.note(Trouble::Unreadable, &self.topic, reason);
+    }
+
+    /// What this process knows of the others.
+    pub(crate) fn roster(&self) -> &Roster {
+        &self.roster
     }
 
     /// From now on this subscription raises that signal and no longer the node's.
     pub fn set_signal(&mut self, signal: &Signal) {
-        self.bell = Bell::new(signal);
+        self.bell = self.slot.hang(signal);
         signal.raise();
     }
 
@@ -296,7 +207,7 @@ impl RawSubscription {
 
     /// Writers that this reader receives from.
     pub fn matched(&self) -> usize {
-        self.roster.matched(self.reader.guid().into()).len()
+        self.roster.matched(self.gid()).len()
     }
 
     /// Fully qualified name of the topic.
@@ -304,9 +215,9 @@ impl RawSubscription {
         &self.topic
     }
 
-    /// The reader's identity.
+    /// The reader's identity; another one after RustDDS has been started anew.
     pub fn gid(&self) -> Gid {
-        self.reader.guid().into()
+        self.slot.gid()
     }
 }
 
@@ -376,14 +287,5 @@ mod tests {
             losses.note(&info(writer, number));
         }
         assert_eq!(losses.lost, 3);
-    }
-
-    #[test]
-    fn only_plain_cdr_has_a_byte_order() {
-        let cdr = |bytes: &'static [u8]| Cdr::from_bytes(bytes);
-        assert_eq!(cdr(&[0, 1, 0, 0, 7]).little_endian(), Some(&[7][..]));
-        assert_eq!(cdr(&[0, 0, 0, 0, 7]).big_endian(), Some(&[7][..]));
-        assert_eq!(cdr(&[0, 7, 0, 0, 7]).little_endian(), None);
-        assert_eq!(cdr(&[0, 1]).little_endian(), None);
     }
 }

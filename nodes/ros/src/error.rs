@@ -57,6 +57,15 @@ pub enum RosError {
         /// The DDS domain.
         domain: u16,
     },
+    /// RustDDS, inside this process, does not answer any more.
+    #[error("node {node} neither hears nor speaks any more: its DDS has died; start it again")]
+    Deaf {
+        /// Fully qualified name.
+        node: String,
+    },
+    /// The process was asked to end while it waited.
+    #[error("asked to end")]
+    Interrupted,
     /// Nodes that are needed did not come up.
     #[error("still missing after {} s: {}", .waited.as_secs_f64(), .missing.join(", "))]
     MissingPeers {

@@ -12,8 +12,9 @@ use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
     CancelStrips, Decision, DecisionPoint, GetStrip, GuidanceStatus, ImagingTask, ListHistory, ListStrips,
-    PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode,
-    SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, UpcomingStrips, WheelTorque,
+    OperatorAction, PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips,
+    SetPlannerMode, SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult,
+    UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -42,6 +43,9 @@ pub const OPERATOR: &str = "operator";
 
 /// The nodes that fly a mission.
 pub const FLIGHT_NODES: [&str; 4] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER];
+
+/// The nodes that count only what other nodes of their mission say, and wait for nobody else.
+pub const MEMBERS: [&str; 5] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER, LAUNCHER];
 
 /// What the table says of a topic or service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,9 +100,12 @@ impl<S: RosService> Service<S> {
 
 /// Simulated time.
 pub const CLOCK: Topic<Clock> = Topic::new("/clock", Profile::Clock, &[SPACECRAFT], &[]);
-/// State of the spacecraft, each tick.
+/// State of the spacecraft as its sensors measure it, each tick.
 pub const SPACECRAFT_STATE: Topic<SpacecraftState> =
     Topic::new("spacecraft/state", Profile::State, &[SPACECRAFT], &[GUIDANCE]);
+/// State of the spacecraft as it is, each tick, where its sensors are not exact: images are judged by it.
+pub const SPACECRAFT_TRUTH: Topic<SpacecraftState> =
+    Topic::new("spacecraft/truth", Profile::State, &[SPACECRAFT], &[GUIDANCE]);
 /// Torque command, each tick.
 pub const WHEEL_TORQUE: Topic<WheelTorque> =
     Topic::new("guidance/wheel_torque", Profile::State, &[GUIDANCE], &[SPACECRAFT]);
@@ -127,9 +134,17 @@ pub const UPCOMING_STRIPS: Topic<UpcomingStrips> =
 /// A strip request from anyone, without an answer.
 pub const STRIP_REQUEST: Topic<StripRequest> =
     Topic::new("requests/request", Profile::Event, &[OPERATOR], &[REQUEST_MANAGER]);
+/// How each task went, with its reward settled.
+pub const TASK_RESULTS: Topic<TaskResult> =
+    Topic::new("requests/results", Profile::Command, &[REQUEST_MANAGER], &[LAUNCHER]);
 /// Changes of strip requests.
 pub const STRIP_EVENTS: Topic<StripStatus> =
     Topic::new("requests/events", Profile::Event, &[REQUEST_MANAGER], &[OPERATOR]);
+/// What was asked for of the request manager and taken.
+pub const REQUEST_ACTIONS: Topic<OperatorAction> =
+    Topic::new("requests/actions", Profile::Event, &[REQUEST_MANAGER], &[]);
+/// What was asked for of the planner and taken.
+pub const PLANNER_ACTIONS: Topic<OperatorAction> = Topic::new("planner/actions", Profile::Event, &[PLANNER], &[]);
 /// How many strip requests are in which state.
 pub const REQUEST_SUMMARY: Topic<RequestSummary> =
     Topic::new("requests/summary", Profile::Latched, &[REQUEST_MANAGER], &[LAUNCHER, OPERATOR]);
@@ -173,6 +188,7 @@ pub const REVIEW_PROPOSAL: Service<ReviewProposal> = Service::new("planner/revie
 pub const TOPICS: &[Entry] = &[
     CLOCK.entry,
     SPACECRAFT_STATE.entry,
+    SPACECRAFT_TRUTH.entry,
     SUB_SATELLITE_POINT.entry,
     WHEELS.entry,
     TF.entry,
@@ -182,12 +198,15 @@ pub const TOPICS: &[Entry] = &[
     TASK_PHASE.entry,
     UPCOMING_STRIPS.entry,
     STRIP_REQUEST.entry,
+    TASK_RESULTS.entry,
     STRIP_EVENTS.entry,
+    REQUEST_ACTIONS.entry,
     REQUEST_SUMMARY.entry,
     TASK_ABORT.entry,
     PLANNER_TASK.entry,
     PLANNER_DECISION.entry,
     PLANNER_STATUS.entry,
+    PLANNER_ACTIONS.entry,
     DIAGNOSTICS.entry,
     ROSOUT.entry,
     PARAMETER_EVENTS.entry,
@@ -288,6 +307,7 @@ mod tests {
     operator[operator]
     recorder[recorder]
     spacecraft -->|spacecraft/state| guidance
+    spacecraft -->|spacecraft/truth| guidance
     guidance -->|guidance/wheel_torque| spacecraft
     guidance -->|guidance/decision_point| request_manager
     guidance -->|guidance/decision_point| planner
@@ -296,6 +316,7 @@ mod tests {
     guidance -->|guidance/phase| request_manager
     request_manager -->|requests/upcoming| planner
     operator -->|requests/request| request_manager
+    request_manager -->|requests/results| launcher
     request_manager -->|requests/events| operator
     request_manager -->|requests/summary| launcher
     request_manager -->|requests/summary| operator

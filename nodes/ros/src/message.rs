@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use swath_msgs::RosMessage;
 
-use crate::endpoint::{Cdr, header_with_room};
+use crate::cdr::{Cdr, header_with_room};
 use crate::error::RosError;
 
 /// Writes a message as little-endian CDR, encapsulation header included.

@@ -1,31 +1,35 @@
 //! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Publisher as DdsPublisher, QosPolicies, RTPSEntity as _,
-    Subscriber as DdsSubscriber, TopicKind,
-};
+use rustdds::{RTPSEntity as _, Timestamp};
 use swath_msgs::{RosMessage, RosService};
 
-use crate::background::Background;
+use crate::background::{Background, Fault, Hearing};
 use crate::cli::RosArgs;
 use crate::clock::SimClock;
+use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
-use crate::endpoint::{Adapter, Cdr, Gid, RawPublisher, RawSubscription};
+use crate::endpoint::{Gid, RawPublisher, RawSubscription};
 use crate::environment::Environment;
 use crate::error::RosError;
 use crate::graph::{self, Entry};
 use crate::logging;
+use crate::members::{Identity, Members};
+use crate::memory;
+use crate::message::encode_as;
+use crate::minder::Minder;
 use crate::names::{Names, dds_service, dds_topic, dds_type};
+use crate::notices::Notice;
 use crate::param_services::ParameterServices;
 use crate::params::{Parameters, Spec};
-use crate::qos::{Profile, QosProfile, policies, with_depth};
+use crate::qos::{Profile, QosProfile, with_depth};
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
-use crate::signal::{Signal, lock};
+use crate::signal::Signal;
+use crate::slot::{Plan, WriterSlot};
 use crate::topic::{Publisher, Subscription};
 
 /// How long a new node listens for another one of its name before it shows itself.
@@ -37,27 +41,27 @@ const SETTLING: Duration = Duration::from_millis(300);
 const ANNOUNCEMENTS: &str = "ros_discovery_info";
 const ANNOUNCEMENT_TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 
+/// Memory of a mission's node [10^6 B]: ten times what one needs.
+const MEMBER_MEMORY_MB: i64 = 1000;
+
+/// Where nodes of ours say who they are; no topic of the ROS graph.
+const IDENTITIES: &str = "swath_identity";
+const IDENTITY_TYPE: &str = "swath_msgs/msg/Identity";
+
 /// A ROS 2 node.
 ///
 /// Drop its publishers, subscriptions, servers and clients before the node itself.
 pub struct Node {
     // Fields are dropped in this order: the thread first, the participant last.
     background: Background,
-    endpoints: Mutex<Vec<(Direction, Gid, Entry)>>,
+    introduction: Arc<WriterSlot>,
     roster: Arc<Roster>,
     parameters: Parameters,
     clock: SimClock,
     signal: Signal,
     names: Names,
     environment: Environment,
-    dds: Dds,
-}
-
-/// What endpoints are made with.
-struct Dds {
-    publisher: DdsPublisher,
-    subscriber: DdsSubscriber,
-    participant: DomainParticipant,
+    dds: Arc<Dds>,
 }
 
 impl Node {
@@ -73,39 +77,41 @@ impl Node {
     /// As [`Self::start`], in an environment of the caller's choice.
     pub fn start_in(environment: Environment, name: &str, args: &RosArgs) -> Result<Self, RosError> {
         let names = args.names(graph::NAMESPACE, name)?;
-        let dds = Dds::new(&environment)?;
+        let parameters = Parameters::new(args, &names);
+        let (identity, members) = declare_identity(name, &names, &parameters)?;
+        let is_member = graph::MEMBERS.contains(&name);
+        declare_memory(is_member, &parameters)?;
+        let dds = Arc::new(Dds::new(&environment)?);
+        let participant = dds.participant();
+        let minder = Arc::new(Minder::new(&participant)?);
         let signal = Signal::new();
-        let qos = Profile::Latched.qos();
-        let own = Gid::from(dds.participant.guid());
-        let dds_type = dds_type(ANNOUNCEMENT_TYPE)?;
-        let announcer = dds.writer(ANNOUNCEMENTS, &dds_type, &qos)?;
-        let roster = Arc::new(Roster::new(own, names.clone(), announcer));
-        let announcements = RawSubscription::new(
-            dds.reader(ANNOUNCEMENTS, &dds_type, &with_depth(qos, 256))?,
-            ANNOUNCEMENTS.to_owned(),
-            Arc::clone(&roster),
-            &signal,
-        );
-        let background = Background::start(&dds.participant, Arc::clone(&roster), announcements, signal.clone())?;
-        let node = Self {
-            background,
-            endpoints: Mutex::default(),
-            roster,
-            parameters: Parameters::new(args, &names),
-            clock: SimClock::default(),
-            signal,
-            names,
-            environment,
-            dds,
+        let latched = Profile::Latched.qos();
+        let announcer = dds.writer(plan(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE, &latched)?)?;
+        let own = Gid::from(participant.guid());
+        let roster = Roster::new(own, names.clone(), announcer, Arc::clone(&minder), members, is_member);
+        let roster = Arc::new(roster);
+        let listen = |topic: &str, type_name: &str| -> Result<RawSubscription, RosError> {
+            let reader = dds.reader(plan(topic, type_name, &with_depth(latched.clone(), 256))?)?;
+            Ok(RawSubscription::new(reader, topic.to_owned(), Arc::clone(&roster), &signal))
         };
-        node.come_up(args)?;
+        let hearing = Hearing {
+            listener: participant.status_listener(),
+            announcements: listen(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE)?,
+            identities: listen(IDENTITIES, IDENTITY_TYPE)?,
+        };
+        let introduction = dds.writer(plan(IDENTITIES, IDENTITY_TYPE, &latched)?)?;
+        let background = Background::start(hearing, Arc::clone(&dds), Arc::clone(&roster), minder, signal.clone())?;
+        let clock = SimClock::default();
+        let node = Self { background, introduction, roster, parameters, clock, signal, names, environment, dds };
+        node.come_up(args, &identity)?;
         Ok(node)
     }
 
-    fn come_up(&self, args: &RosArgs) -> Result<(), RosError> {
+    fn come_up(&self, args: &RosArgs, identity: &Identity) -> Result<(), RosError> {
         if self.roster.wait_until(Instant::now() + LISTENING, || self.roster.namesake().is_some()) {
             return Err(self.duplicate());
         }
+        self.introduce(identity)?;
         self.roster.announce();
         let rosout = match args.rosout() {
             true => Some(Arc::new(self.publisher(&graph::ROSOUT)?)),
@@ -118,6 +124,14 @@ impl Node {
         self.parameters.declare(use_sim_time.read_only())?;
         self.background.serve(self.parameter_services()?);
         Ok(())
+    }
+
+    fn introduce(&self, identity: &Identity) -> Result<(), RosError> {
+        let cdr = encode_as(IDENTITY_TYPE, identity)?;
+        self.introduction
+            .write(cdr, Some(Timestamp::now()).into())
+            .map(|_| ())
+            .map_err(|error| RosError::Send { topic: IDENTITIES.to_owned(), reason: error.to_string() })
     }
 
     fn parameter_services(&self) -> Result<ParameterServices, RosError> {
@@ -139,7 +153,7 @@ impl Node {
     pub fn publisher<M: RosMessage>(&self, topic: &graph::Topic<M>) -> Result<Publisher<M>, RosError> {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_publisher(name, type_name, &profile.qos())?;
-        self.remember(Direction::Write, raw.gid(), topic.entry);
+        self.roster.remember(Direction::Write, raw.gid(), topic.entry);
         Ok(Publisher::new(raw))
     }
 
@@ -156,22 +170,22 @@ impl Node {
     ) -> Result<Subscription<M>, RosError> {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
-        self.remember(Direction::Read, raw.gid(), topic.entry);
-        Ok(Subscription::new(raw))
+        self.roster.remember(Direction::Read, raw.gid(), topic.entry);
+        Ok(Subscription::new(raw, topic.entry.writers))
     }
 
     /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
     pub fn raw_publisher(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawPublisher, RosError> {
         let topic = self.names.resolve(name)?;
-        self.writer(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
+        self.writer(topic.clone(), &dds_topic(&topic), type_name, qos)
     }
 
     /// A reader of CDR bytes from the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
     pub fn raw_subscription(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawSubscription, RosError> {
         let topic = self.names.resolve(name)?;
-        self.reader(topic.clone(), &dds_topic(&topic), &dds_type(type_name)?, qos)
+        self.reader(topic.clone(), &dds_topic(&topic), type_name, qos)
     }
 
     /// A server of a service.
@@ -179,10 +193,8 @@ impl Node {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
         let qos = Profile::Service.qos();
-        let request_type = dds_type(S::Request::TYPE_NAME)?;
-        let response_type = dds_type(S::Response::TYPE_NAME)?;
-        let requests = self.reader(name.clone(), &request_topic, &request_type, &qos)?;
-        let responses = self.writer(name, &response_topic, &response_type, &qos)?;
+        let requests = self.reader(name.clone(), &request_topic, S::Request::TYPE_NAME, &qos)?;
+        let responses = self.writer(name, &response_topic, S::Response::TYPE_NAME, &qos)?;
         Ok(Server::new(requests, responses, self.environment.mapping))
     }
 
@@ -191,10 +203,8 @@ impl Node {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
         let qos = Profile::Service.qos();
-        let request_type = dds_type(S::Request::TYPE_NAME)?;
-        let response_type = dds_type(S::Response::TYPE_NAME)?;
-        let requests = self.writer(name.clone(), &request_topic, &request_type, &qos)?;
-        let responses = self.reader(name.clone(), &response_topic, &response_type, &qos)?;
+        let requests = self.writer(name.clone(), &request_topic, S::Request::TYPE_NAME, &qos)?;
+        let responses = self.reader(name.clone(), &response_topic, S::Response::TYPE_NAME, &qos)?;
         Ok(Client::new(name, requests, responses, self.environment.mapping))
     }
 
@@ -202,28 +212,24 @@ impl Node {
         &self,
         topic: String,
         dds_topic: &str,
-        dds_type: &str,
+        type_name: &str,
         qos: &QosProfile,
     ) -> Result<RawPublisher, RosError> {
-        let writer = self.dds.writer(dds_topic, dds_type, qos)?;
-        self.roster.enrol(Direction::Write, writer.guid().into());
-        Ok(RawPublisher { writer, topic, roster: Arc::clone(&self.roster) })
+        let writer = self.dds.writer(plan(dds_topic, type_name, qos)?)?;
+        self.roster.enrol(Direction::Write, writer.gid());
+        Ok(RawPublisher::new(writer, topic, Arc::clone(&self.roster)))
     }
 
     fn reader(
         &self,
         topic: String,
         dds_topic: &str,
-        dds_type: &str,
+        type_name: &str,
         qos: &QosProfile,
     ) -> Result<RawSubscription, RosError> {
-        let reader = self.dds.reader(dds_topic, dds_type, qos)?;
-        self.roster.enrol(Direction::Read, reader.guid().into());
+        let reader = self.dds.reader(plan(dds_topic, type_name, qos)?)?;
+        self.roster.enrol(Direction::Read, reader.gid());
         Ok(RawSubscription::new(reader, topic, Arc::clone(&self.roster), &self.signal))
-    }
-
-    fn remember(&self, direction: Direction, gid: Gid, entry: Entry) {
-        lock(&self.endpoints).push((direction, gid, entry));
     }
 
     /// Waits for news on this node's subscriptions, and tells whether there are any.
@@ -231,10 +237,29 @@ impl Node {
     /// See [`Signal::wait`]: take from each subscription until it has nothing, then wait.
     ///
     /// # Errors
-    /// If this node has to go because another one has its name.
+    /// As [`Self::check`].
     pub fn wait(&self, timeout: Duration) -> Result<bool, RosError> {
         let news = self.signal.wait(timeout);
-        if self.background.must_yield() { Err(self.duplicate()) } else { Ok(news) }
+        self.check()?;
+        Ok(news)
+    }
+
+    /// Looks whether this node may go on; for those who wait for its signal themselves.
+    ///
+    /// # Errors
+    /// If another node that came up together with it has its name, or if its DDS has died.
+    pub fn check(&self) -> Result<(), RosError> {
+        match self.background.fault() {
+            None => Ok(()),
+            Some(Fault::Namesake) => Err(self.duplicate()),
+            Some(Fault::Deaf) => Err(RosError::Deaf { node: self.names.fully_qualified() }),
+        }
+    }
+
+    /// What went wrong with the messages of others since this was last called: each kind on each topic at most once
+    /// in five seconds, with how often it happened. Nothing of it is a reason to stop.
+    pub fn notices(&self) -> Vec<Notice> {
+        self.roster.notices.take(Instant::now())
     }
 
     /// Waits until each of the nodes (as the table names them, in this namespace) is matched on
@@ -245,8 +270,8 @@ impl Node {
     /// If that is not so when the time is over; the error names what is missing.
     pub fn wait_for_peers(&self, nodes: &[&str], timeout: Duration) -> Result<(), RosError> {
         let deadline = Instant::now() + timeout;
-        if !self.roster.wait_until(deadline, || self.missing(nodes).is_empty()) {
-            return Err(RosError::MissingPeers { waited: timeout, missing: self.missing(nodes) });
+        if !self.roster.wait_until(deadline, || self.roster.missing(nodes).is_empty()) {
+            return Err(RosError::MissingPeers { waited: timeout, missing: self.roster.missing(nodes) });
         }
         std::thread::sleep(SETTLING);
         Ok(())
@@ -262,34 +287,6 @@ impl Node {
         Ok(())
     }
 
-    fn missing(&self, nodes: &[&str]) -> Vec<String> {
-        let there = self.roster.nodes();
-        let namespace = self.names.namespace().trim_end_matches('/');
-        let mut missing = Vec::new();
-        for node in nodes {
-            let full = format!("{namespace}/{node}");
-            if !there.contains(&full) {
-                missing.push(format!("node {full} is not there"));
-                continue;
-            }
-            for (direction, gid, entry) in lock(&self.endpoints).iter() {
-                let (others, verb) = match direction {
-                    Direction::Write => (entry.readers, "read"),
-                    Direction::Read => (entry.writers, "write"),
-                };
-                let common = others.contains(node) || (*node == graph::RECORDER && *direction == Direction::Write);
-                let common = common && self.roster.is_enrolled(*direction, *gid);
-                if common && !self.roster.matched_nodes(*gid).contains(&full) {
-                    missing.push(format!("{full} does not {verb} {}", entry.name));
-                }
-            }
-        }
-        if !missing.is_empty() {
-            missing.extend(self.roster.refusals());
-        }
-        missing
-    }
-
     /// Fully qualified names of the nodes of the other processes in the domain.
     pub fn nodes(&self) -> BTreeSet<String> {
         self.roster.nodes()
@@ -297,7 +294,7 @@ impl Node {
 
     /// The topic writers of the other processes in the domain.
     pub fn remote_writers(&self) -> Vec<RemoteWriter> {
-        remote_writers(&self.dds.participant)
+        remote_writers(&self.dds.participant())
     }
 
     /// The parameters of this node.
@@ -336,54 +333,28 @@ impl Drop for Node {
     }
 }
 
-impl Dds {
-    fn new(environment: &Environment) -> Result<Self, RosError> {
-        let what = format!("a participant in domain {}", environment.domain);
-        let failed = |error: rustdds::dds::CreateError| create_error(&what, &error);
-        let mut builder = DomainParticipantBuilder::new(environment.domain);
-        if let Some(networks) = environment.networks() {
-            builder = builder.with_only_networks(networks);
-        }
-        let participant = builder.build().map_err(failed)?;
-        let none = QosPolicies::builder().build();
-        let publisher = participant.create_publisher(&none).map_err(failed)?;
-        let subscriber = participant.create_subscriber(&none).map_err(failed)?;
-        Ok(Self { publisher, subscriber, participant })
-    }
-
-    fn writer(
-        &self,
-        topic: &str,
-        type_name: &str,
-        qos: &QosProfile,
-    ) -> Result<rustdds::no_key::DataWriter<Cdr, Adapter>, RosError> {
-        let what = format!("a writer of {topic}");
-        let policies = policies(qos);
-        let topic = self.topic(topic, type_name, &policies)?;
-        self.publisher.create_datawriter_no_key(&topic, Some(policies)).map_err(|error| create_error(&what, &error))
-    }
-
-    fn reader(
-        &self,
-        topic: &str,
-        type_name: &str,
-        qos: &QosProfile,
-    ) -> Result<rustdds::no_key::SimpleDataReader<Cdr, Adapter>, RosError> {
-        let what = format!("a reader of {topic}");
-        let policies = policies(qos);
-        let topic = self.topic(topic, type_name, &policies)?;
-        self.subscriber
-            .create_simple_datareader_no_key(&topic, Some(policies))
-            .map_err(|error| create_error(&what, &error))
-    }
-
-    fn topic(&self, name: &str, type_name: &str, policies: &QosPolicies) -> Result<rustdds::Topic, RosError> {
-        self.participant
-            .create_topic(name.to_owned(), type_name.to_owned(), policies, TopicKind::NoKey)
-            .map_err(|error| create_error(&format!("the topic {name}"), &error))
-    }
+/// Declares the parameters that say who belongs to the mission.
+fn declare_identity(name: &str, names: &Names, parameters: &Parameters) -> Result<(Identity, Members), RosError> {
+    let fleet = "Nodes of a mission say the same; messages of others do not count. The launcher chooses it.";
+    let fleet: String = parameters.declare(Spec::new("fleet", String::new(), fleet).read_only())?;
+    let epoch = "How often the node was started in this mission: of two with one name, the later start counts.";
+    let epoch = Spec::new("epoch", 0_i64, epoch).in_range(0.0..=9e15).read_only();
+    let epoch = parameters.declare(epoch)?.unsigned_abs();
+    let external = "Nodes of the table whose place another program takes: its messages count by its name in ROS.";
+    let external: Vec<String> = parameters.declare(Spec::new("external", Vec::new(), external).read_only())?;
+    let namespace = names.namespace().to_owned();
+    let members = Members::new(&namespace, fleet.clone(), external);
+    Ok((Identity { namespace, node: name.to_owned(), fleet, epoch }, members))
 }
 
-fn create_error(what: &str, error: &rustdds::dds::CreateError) -> RosError {
-    RosError::Create { what: what.to_owned(), reason: error.to_string() }
+/// Declares the parameter that bounds the memory of this process, and bounds it.
+fn declare_memory(is_member: bool, parameters: &Parameters) -> Result<(), RosError> {
+    let text = "Memory that this process may have [10^6 B], 0 without bound; beyond it, it ends.";
+    let default = if is_member { MEMBER_MEMORY_MB } else { 0 };
+    let limit = Spec::new("memory_limit_mb", default, text).in_range(0.0..=1e9).read_only();
+    memory::bound(parameters.declare(limit)?.unsigned_abs())
+}
+
+fn plan(dds_topic: &str, type_name: &str, qos: &QosProfile) -> Result<Plan, RosError> {
+    Ok(Plan { topic: dds_topic.to_owned(), type_name: dds_type(type_name)?, qos: qos.clone() })
 }

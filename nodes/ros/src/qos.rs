@@ -4,6 +4,7 @@ use std::time::Duration;
 
 pub use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use rustdds::QosPolicies;
+use rustdds::policy::Reliability as DdsReliability;
 
 /// A quality-of-service profile of the node graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -62,15 +63,18 @@ impl Profile {
             _ => None,
         };
         QosProfile::publisher_default()
-            .reliability_reliable(WhenFull::Wait(SEND_TIMEOUT))
+            .reliability_reliable(WhenFull::Wait(BLOCKING))
             .durability(durability)
             .history(History::KeepLast { depth: self.depth() })
             .lifespan(lifespan)
     }
 }
 
-/// How long a send waits for a reader that lags thousands of samples behind.
+/// How long a send waits at most for readers that lag thousands of samples behind.
 pub const SEND_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// How long RustDDS waits at a time; then a node of a mission waits for these readers no longer.
+const BLOCKING: Duration = Duration::from_secs(1);
 
 /// The profile with another depth.
 pub(crate) fn with_depth(qos: QosProfile, depth: usize) -> QosProfile {
@@ -79,6 +83,11 @@ pub(crate) fn with_depth(qos: QosProfile, depth: usize) -> QosProfile {
 
 pub(crate) fn policies(qos: &QosProfile) -> QosPolicies {
     QosPolicies::from(qos)
+}
+
+/// Whether an endpoint asks for, or offers, reliability.
+pub(crate) fn is_reliable(policies: &QosPolicies) -> bool {
+    matches!(policies.reliability(), Some(DdsReliability::Reliable { .. }))
 }
 
 #[cfg(test)]

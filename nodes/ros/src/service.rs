@@ -12,7 +12,8 @@ use rustdds::{GUID, SampleIdentity, SequenceNumber};
 use serde::{Deserialize, Serialize};
 use swath_msgs::{RosMessage, RosService};
 
-use crate::endpoint::{Cdr, RawPublisher, RawSample, RawSubscription};
+use crate::cdr::Cdr;
+use crate::endpoint::{RawPublisher, RawSample, RawSubscription};
 use crate::error::RosError;
 use crate::message::{decode, decode_as, encode, encode_as};
 use crate::signal::Signal;
@@ -127,13 +128,15 @@ impl<S: RosService> Server<S> {
     ///
     /// Once it has returned nothing, the next request to come raises the node's [`Signal`].
     ///
-    /// # Errors
-    /// If the bytes that came are no such request; the next call goes on with the next one.
+    /// Bytes that are no such request are passed over and counted (`Node::notices`).
     pub fn take(&self) -> Result<Option<(RequestId, S::Request)>, RosError> {
-        let Some(sample) = self.requests.take()? else {
-            return Ok(None);
-        };
-        self.mapping.unwrap(&sample, sample.info.writer.0).map(Some)
+        while let Some(sample) = self.requests.take()? {
+            match self.mapping.unwrap(&sample, sample.info.writer.0) {
+                Ok(request) => return Ok(Some(request)),
+                Err(error) => self.requests.note_unreadable(|| error.to_string()),
+            }
+        }
+        Ok(None)
     }
 
     /// Answers a request.
@@ -143,21 +146,13 @@ impl<S: RosService> Server<S> {
     }
 
     /// Answers all requests that have come, and returns how many.
-    ///
-    /// A request that cannot be read is logged and passed over.
     pub fn answer_all(&self, mut answer: impl FnMut(S::Request) -> S::Response) -> Result<usize, RosError> {
         let mut answered = 0;
-        loop {
-            match self.take() {
-                Ok(Some((id, request))) => {
-                    self.respond(id, answer(request))?;
-                    answered += 1;
-                }
-                Ok(None) => return Ok(answered),
-                Err(error @ RosError::Decode { .. }) => tracing::warn!("{error}"),
-                Err(error) => return Err(error),
-            }
+        while let Some((id, request)) = self.take()? {
+            self.respond(id, answer(request))?;
+            answered += 1;
         }
+        Ok(answered)
     }
 
     pub(crate) fn set_signal(&mut self, signal: &Signal) {
@@ -205,9 +200,11 @@ impl<S: RosService> Client<S> {
     pub fn take(&self) -> Result<Option<(RequestId, S::Response)>, RosError> {
         let own = self.requests.gid().0;
         while let Some(sample) = self.responses.take()? {
-            let (id, response) = self.mapping.unwrap(&sample, own)?;
-            if id.client == own {
-                return Ok(Some((id, response)));
+            match self.mapping.unwrap(&sample, own) {
+                Ok((id, response)) if id.client == own => return Ok(Some((id, response))),
+                // Meant for another client.
+                Ok(_) => {}
+                Err(error) => self.responses.note_unreadable(|| error.to_string()),
             }
         }
         Ok(None)

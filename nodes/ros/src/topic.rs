@@ -1,14 +1,18 @@
 //! Typed writers and readers.
 
+use std::collections::VecDeque;
 use std::marker::PhantomData;
-use std::time::Duration;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use swath_msgs::RosMessage;
 
-use crate::endpoint::{Gid, RawPublisher, RawSubscription, SampleInfo};
+use crate::endpoint::{Gid, RawPublisher, RawSample, RawSubscription, SampleInfo};
 use crate::error::RosError;
+use crate::graph::OPERATOR;
+use crate::members::Standing;
 use crate::message::{decode, encode};
-use crate::signal::Signal;
+use crate::signal::{Signal, lock};
 
 /// Writes messages to a topic.
 pub struct Publisher<M> {
@@ -24,7 +28,7 @@ impl<M: RosMessage> Publisher<M> {
     /// Sends a message.
     ///
     /// # Errors
-    /// If it cannot be encoded, or a reader has been lagging for [`crate::qos::SEND_TIMEOUT`].
+    /// If it cannot be encoded, or as [`RawPublisher::publish`].
     pub fn publish(&self, message: &M) -> Result<(), RosError> {
         self.raw.publish(encode(message)?)
     }
@@ -60,14 +64,27 @@ pub struct Sample<M> {
 }
 
 /// Reads messages from a topic.
+///
+/// In a node of a mission, only messages of the writers that the table names count, if they belong to the mission.
+/// Those of others are passed over and counted (`Node::notices`), and so are bytes that are no message of the type.
 pub struct Subscription<M> {
     raw: RawSubscription,
+    /// Names of the nodes whose messages count; everybody's do if there are none.
+    writers: &'static [&'static str],
+    /// A writer that counts, up to a revision of what is known of the others.
+    counts: Mutex<Option<(Gid, u64)>>,
+    /// Messages of writers that are not known yet.
+    parked: Mutex<VecDeque<RawSample>>,
     message: PhantomData<fn() -> M>,
 }
 
+/// Messages of unknown writers that are kept.
+const PARKED: usize = 64;
+
 impl<M: RosMessage> Subscription<M> {
-    pub(crate) fn new(raw: RawSubscription) -> Self {
-        Self { raw, message: PhantomData }
+    pub(crate) fn new(raw: RawSubscription, writers: &'static [&'static str]) -> Self {
+        let writers = if writers.contains(&OPERATOR) { &[] } else { writers };
+        Self { raw, writers, counts: Mutex::default(), parked: Mutex::default(), message: PhantomData }
     }
 
     /// The next message, if there is one.
@@ -75,29 +92,95 @@ impl<M: RosMessage> Subscription<M> {
     /// Once it has returned nothing, the next message to come raises the node's [`Signal`].
     ///
     /// # Errors
-    /// If the bytes that came are no such message; the next call goes on with the next sample.
+    /// If DDS fails; never because of what others send.
     pub fn take(&self) -> Result<Option<M>, RosError> {
         Ok(self.take_sample()?.map(|sample| sample.message))
     }
 
     /// As [`Self::take`], with what came with the message.
+    ///
+    /// # Errors
+    /// As [`Self::take`].
     pub fn take_sample(&self) -> Result<Option<Sample<M>>, RosError> {
-        let Some(sample) = self.raw.take()? else {
-            return Ok(None);
-        };
-        Ok(Some(Sample { message: decode(&sample.cdr)?, info: sample.info }))
+        while let Some(sample) = self.take_counted()? {
+            match decode(&sample.cdr) {
+                Ok(message) => return Ok(Some(Sample { message, info: sample.info })),
+                Err(error) => self.raw.note_unreadable(|| error.to_string()),
+            }
+        }
+        Ok(None)
+    }
+
+    /// The next sample of a writer that counts.
+    fn take_counted(&self) -> Result<Option<RawSample>, RosError> {
+        if let Some(sample) = self.take_parked() {
+            return Ok(Some(sample));
+        }
+        while let Some(sample) = self.raw.take()? {
+            match self.standing(sample.info.writer) {
+                Standing::Counts => return Ok(Some(sample)),
+                Standing::Stranger => self.note_stranger(&sample),
+                Standing::Unknown => self.park(sample),
+            }
+        }
+        Ok(None)
+    }
+
+    /// A sample whose writer has become known since it came.
+    fn take_parked(&self) -> Option<RawSample> {
+        let mut parked = lock(&self.parked);
+        let mut index = 0;
+        while let Some(sample) = parked.get(index) {
+            match self.standing(sample.info.writer) {
+                Standing::Counts => return parked.remove(index),
+                Standing::Unknown => index += 1,
+                Standing::Stranger => {
+                    self.note_stranger(sample);
+                    parked.remove(index);
+                }
+            }
+        }
+        None
+    }
+
+    fn park(&self, sample: RawSample) {
+        let mut parked = lock(&self.parked);
+        if parked.len() == PARKED {
+            self.note_stranger(&sample);
+        } else {
+            parked.push_back(sample);
+        }
+    }
+
+    fn standing(&self, writer: Gid) -> Standing {
+        if self.writers.is_empty() {
+            return Standing::Counts;
+        }
+        let roster = self.raw.roster();
+        if *lock(&self.counts) == Some((writer, roster.revision())) {
+            return Standing::Counts;
+        }
+        let (standing, revision) = roster.standing(writer, self.writers);
+        if standing == Standing::Counts {
+            *lock(&self.counts) = Some((writer, revision));
+        }
+        standing
+    }
+
+    fn note_stranger(&self, sample: &RawSample) {
+        self.raw.roster().note_stranger(sample.info.writer, self.raw.topic());
     }
 
     /// Waits for the next message, and returns nothing when the time is over.
     ///
     /// It waits for the signal of this subscription, and so sees any news that raise it.
     pub fn wait(&self, signal: &Signal, timeout: Duration) -> Result<Option<M>, RosError> {
-        let deadline = std::time::Instant::now() + timeout;
+        let deadline = Instant::now() + timeout;
         loop {
             if let Some(message) = self.take()? {
                 return Ok(Some(message));
             }
-            let remaining = deadline.saturating_duration_since(std::time::Instant::now());
+            let remaining = deadline.saturating_duration_since(Instant::now());
             if remaining.is_zero() {
                 return Ok(None);
             }

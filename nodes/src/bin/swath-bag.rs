@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use swath_nodes::bag::Command;
+use swath_ground::debrief::Command;
+use swath_nodes::POLICIES;
 use swath_ros::RosArgs;
 
 /// Record, play, inspect, re-fly and report rosbag2 bags over MCAP.
@@ -27,5 +28,5 @@ fn main() -> ExitCode {
 
 fn run() -> Result<ExitCode> {
     let (words, ros) = RosArgs::split(std::env::args())?;
-    Args::parse_from(words).command.run(&ros, |spec, seed| Ok(swath_training::planners::make(spec, seed)?))
+    Args::parse_from(words).command.run(&ros, &POLICIES)
 }

@@ -1,5 +1,5 @@
-//! The guidance node; see `swath_nodes::guidance`.
+//! The guidance node; see `swath_space::guidance`.
 
 fn main() -> std::process::ExitCode {
-    swath_nodes::node::exit_code(swath_nodes::guidance::wiring::run())
+    swath_node::node::exit_code(swath_space::guidance::wiring::run())
 }

@@ -1,7 +1,5 @@
-//! The planner node; see `swath_nodes::planner`.
+//! The planner node; see `swath_space::planner`.
 
 fn main() -> std::process::ExitCode {
-    swath_nodes::node::exit_code(swath_nodes::planner::wiring::run(|spec, seed| {
-        Ok(swath_training::planners::make(spec, seed)?)
-    }))
+    swath_node::node::exit_code(swath_space::planner::wiring::run(&swath_nodes::POLICIES))
 }

@@ -1,5 +1,5 @@
-//! The requests node; see `swath_nodes::requests`.
+//! The requests node; see `swath_ground::requests`.
 
 fn main() -> std::process::ExitCode {
-    swath_nodes::node::exit_code(swath_nodes::requests::wiring::run())
+    swath_node::node::exit_code(swath_ground::requests::wiring::run())
 }

@@ -1,5 +1,5 @@
-//! The spacecraft node; see `swath_nodes::spacecraft`.
+//! The spacecraft node; see `swath_space::spacecraft`.
 
 fn main() -> std::process::ExitCode {
-    swath_nodes::node::exit_code(swath_nodes::spacecraft::wiring::run())
+    swath_node::node::exit_code(swath_space::spacecraft::wiring::run())
 }

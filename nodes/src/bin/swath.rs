@@ -3,7 +3,9 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use swath_nodes::{launch, node, operate};
+use swath_ground::{launch, operate};
+use swath_node::node;
+use swath_nodes::POLICIES;
 
 /// Flies and operates a super-agile Earth-observing satellite that images ground strips.
 #[derive(Parser)]
@@ -28,7 +30,7 @@ enum Command {
 #[expect(clippy::print_stdout, reason = "the diagram is this command's result")]
 fn main() -> ExitCode {
     node::exit_code(match Args::parse().command {
-        Command::Launch(args) => launch::run(&args, |spec, seed| Ok(swath_training::planners::make(spec, seed)?)),
+        Command::Launch(args) => launch::run(&args, &POLICIES),
         Command::Strips(args) => operate::run_strips(&args),
         Command::Planner(args) => operate::run_planner(&args),
         Command::Graph => {

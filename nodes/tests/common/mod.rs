@@ -12,10 +12,18 @@ pub fn domain() -> String {
         .to_string()
 }
 
+/// A program of this suite: cargo puts those of all its packages beside `swath`, but builds for a test only those of the
+/// test's own package.
+pub fn program(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_BIN_EXE_swath")).with_file_name(name);
+    let profile = if cfg!(debug_assertions) { "" } else { " --release" };
+    assert!(path.is_file(), "{} is missing: run `cargo build{profile} --workspace --bins`", path.display());
+    path
+}
+
 /// A command of this suite on a domain.
 pub fn command(program: &str, domain: &str) -> Command {
-    let exe = Path::new(env!("CARGO_BIN_EXE_swath"));
-    let mut command = Command::new(exe.with_file_name(program));
+    let mut command = Command::new(self::program(program));
     command.env("ROS_DOMAIN_ID", domain).env("ROS_LOCALHOST_ONLY", "1");
     command
 }

@@ -6,14 +6,15 @@ use anyhow::{Context, Result, bail, ensure};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use swath_sim::config::{RAD_S_PER_RPM, SimConfig};
-use swath_sim::control::TrackingError;
-use swath_sim::dynamics::BodyState;
-use swath_sim::guidance::reference_dcm;
 use swath_sim::model::Model;
-use swath_sim::mrp;
-use swath_sim::orbit::{Orbit, OrbitPhase, Turn, earth_to_inertial};
-use swath_sim::strip::Strip;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::control::TrackingError;
+use swath_sim::vehicle::dynamics::BodyState;
+use swath_sim::vehicle::mrp;
+use swath_sim::world::frames::{earth_to_inertial, reference_dcm};
+use swath_sim::world::orbit::{Orbit, OrbitPhase};
+use swath_sim::world::strip::Strip;
+use swath_sim::world::turn::Turn;
 
 /// A recorded history.
 #[derive(Deserialize)]
@@ -336,7 +337,7 @@ impl<'a> Run<'a> {
                 sigma_BR = backward;
             }
         }
-        // Basilisk reads a switch of MRP sets as a jump: plain difference, unlike `swath_sim::guidance::rate_error`.
+        // Basilisk reads a switch of MRP sets as a jump: plain difference, unlike `swath_sim::vehicle::guidance::rate_error`.
         let omega_BR_B = self
             .previous_sigma
             .map_or(Vector3::zeros(), |previous| mrp::rate_to_omega(&sigma_BR, &((sigma_BR - previous) / dt)));

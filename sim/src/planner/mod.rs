@@ -12,11 +12,10 @@ pub use spec::{PlannerSpec, UnknownPlanner};
 
 use thiserror::Error;
 
-use crate::catalogue::Candidate;
-use crate::env::TaskRecord;
-use crate::flight::Situation;
-use crate::guidance::Task;
 use crate::model::Model;
+use crate::requests::catalogue::Candidate;
+use crate::task::{Task, TaskRecord};
+use crate::vehicle::flight::Situation;
 
 /// Everything that a decision rests on.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +91,7 @@ impl Decision {
                 if t_pre > max {
                     return Err(PlannerError::TransitionTooLong { t_pre, max });
                 }
-                Ok(Task::Image { strip: chosen.strip, t_pre, t_acq: chosen.t_acq })
+                Ok(Task::Image { id: chosen.id, strip: chosen.strip, t_pre, t_acq: chosen.t_acq })
             }
             Self::Wait { ticks: 0 } => Err(PlannerError::EmptyWait),
             Self::Wait { ticks } => Ok(Task::Wait { ticks }),

@@ -23,7 +23,7 @@ impl Planner for Random {
         if context.candidates.is_empty() {
             return Ok(wait(context, std::iter::empty()));
         }
-        let mut rng = rng::stream(self.seed, rng::PLANNER + context.task);
+        let mut rng = rng::planner(self.seed, context.task);
         Ok(Decision::Image {
             candidate: rng.random_range(0..context.candidates.len()),
             t_pre: rng.random_range(0..=context.model.t_pre_max()),

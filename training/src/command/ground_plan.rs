@@ -1,15 +1,18 @@
 //! `swath-train ground-plan`: how good a plan could be, and what one made on the ground is worth in flight.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use serde::Serialize;
 use serde_json::{Value, json};
-use swath_sim::ground::GroundSettings;
-use swath_training::evaluate::{Mission, spread, spread_of};
+use swath_sim::foresight::GroundSettings;
+use swath_sim::vehicle::errors::PlantErrors;
+use swath_training::evaluate::{Mission, Spread, spread, spread_of};
 use swath_training::ground::{Bracket, brackets};
 
-use super::evaluate::{MissionArgs, PlantArgs, pooled_success, print, write_json};
+use super::missions::{MissionArgs, PlantArgs, cell, percent, pooled_success, strips};
+use super::output::{JsonTarget, missions_bar, print};
 
 /// Options of `swath-train ground-plan`.
 #[derive(Debug, Args)]
@@ -41,39 +44,72 @@ fn share(text: &str) -> Result<f64, String> {
 
 /// Runs `ground-plan`.
 pub fn ground_plan(args: &GroundPlanArgs) -> Result<()> {
+    let json = JsonTarget::new(args.json.as_deref())?;
     let plants = args.plants.named()?;
     let errors: Vec<_> = plants.iter().map(|(_, errors)| errors.clone()).collect();
     let settings =
         GroundSettings { width: args.width as usize, branches: args.branches as usize, weakness: args.weakness };
-    let found = brackets(&args.missions.missions()?, &errors, &settings)?;
+    let missions = args.missions.missions()?;
+    let bar = missions_bar(args.missions.episodes)?;
+    let found = brackets(&missions, &errors, &settings, || bar.inc(1))?;
+    bar.finish_and_clear();
     let of = |quantity: fn(&Bracket) -> f64| spread_of(&found.iter().map(quantity).collect::<Vec<f64>>());
     let (known, bound) = (of(|it| it.best_known), of(|it| it.upper_bound));
-    let mut table = format!(
-        "                                   reward/orbit   ± 95 %\n\
-         {:<34} {:>12.3} {:>8.3}\n{:<34} {:>12.3} {:>8.3}\n\n\
-         plan flown blindly                 reward/orbit   ± 95 %  success\n",
-        "no plan exceeds", bound.mean, bound.confidence_95, "best plan found", known.mean, known.confidence_95,
-    );
-    let mut flown = Vec::new();
-    for (number, (name, errors)) in plants.iter().enumerate() {
-        let own: Vec<Mission> = found.iter().map(|it| it.flown[number]).collect();
-        let reward = spread(&own, |it| it.reward_per_orbit);
-        let success = pooled_success(&own);
-        table += &format!("{name:<34} {:>12.3} {:>8.3} {:>7.1}%\n", reward.mean, reward.confidence_95, success * 100.0);
-        flown.push(json!({
-            "plant": name, "errors": errors, "reward_per_orbit": reward, "success_rate": success, "missions": own,
-        }));
-    }
-    if args.json.as_deref() != Some(Path::new("-")) {
-        print(&table)?;
+    let flown: Vec<Flown> = plants
+        .iter()
+        .enumerate()
+        .map(|(number, (name, errors))| {
+            let missions: Vec<Mission> = found.iter().map(|it| it.flown[number]).collect();
+            let reward_per_orbit = spread(&missions, |it| Some(it.reward_per_orbit));
+            Flown { plant: name, errors, reward_per_orbit, success_rate: pooled_success(&missions), missions }
+        })
+        .collect();
+    if json.leaves_stdout() {
+        print(&table(bound, known, &flown))?;
     }
     let each: Vec<Value> = found
         .iter()
         .map(|it| json!({ "seed": it.seed, "best_known": it.best_known, "upper_bound": it.upper_bound, "ticks": it.ticks }))
         .collect();
-    let whole = json!({
-        "missions": args.missions.describe(), "width": args.width, "branches": args.branches, "weakness": args.weakness,
-        "best_known": known, "upper_bound": bound, "brackets": each, "flown_blindly": flown,
-    });
-    args.json.as_deref().map_or(Ok(()), |path| write_json(path, &whole))
+    let mut whole = args.missions.describe(&missions);
+    for (key, value) in [
+        ("policies", json!([])),
+        ("width", json!(args.width)),
+        ("branches", json!(args.branches)),
+        ("weakness", json!(args.weakness)),
+        ("best_known", json!(known)),
+        ("upper_bound", json!(bound)),
+        ("brackets", json!(each)),
+        ("flown_blindly", json!(flown)),
+    ] {
+        whole[key] = value;
+    }
+    json.write(&whole)
+}
+
+/// The plans as they were flown on one plant.
+#[derive(Serialize)]
+struct Flown<'a> {
+    plant: &'a str,
+    errors: &'a PlantErrors,
+    reward_per_orbit: Option<Spread>,
+    success_rate: Option<f64>,
+    missions: Vec<Mission>,
+}
+
+fn table(bound: Option<Spread>, known: Option<Spread>, flown: &[Flown]) -> String {
+    let rewards = |name: &str, reward: Option<Spread>| {
+        let (mean, confidence) = (reward.map(|it| it.mean), reward.and_then(|it| it.confidence_95));
+        format!("{name:<34} {:>12} {:>8}", cell(mean, 3), cell(confidence, 3))
+    };
+    let mut table = format!(
+        "                                   reward/orbit   ± 95 %\n{}\n{}\n\n\
+         plan flown blindly                 reward/orbit   ± 95 %  success\n",
+        rewards("no plan exceeds", bound),
+        rewards("best plan found", known),
+    );
+    for it in flown {
+        table += &format!("{} {:>8}\n", rewards(it.plant, it.reward_per_orbit), percent(it.success_rate));
+    }
+    table + &flown.first().map_or_else(String::new, |it| strips(&it.missions))
 }

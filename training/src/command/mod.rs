@@ -3,6 +3,10 @@
 pub mod evaluate;
 pub mod figures;
 pub mod ground_plan;
+mod missions;
+mod output;
+mod run_folder;
+mod session;
 pub mod train;
 
 fn cores() -> usize {

@@ -96,16 +96,20 @@ pub struct DiscretePpo {
 
 impl NetworkConfig {
     /// The name used in configurations, tables and file names.
+    #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
-            NetworkConfig::HopPpo(_) => "hop-ppo",
-            NetworkConfig::HopPpoMlp(_) => "hop-ppo-mlp",
-            NetworkConfig::HPpo(_) => "h-ppo",
-            NetworkConfig::DiscretePpo(_) => "discrete-ppo",
+            Self::HopPpo(_) => "hop-ppo",
+            Self::HopPpoMlp(_) => "hop-ppo-mlp",
+            Self::HPpo(_) => "h-ppo",
+            Self::DiscretePpo(_) => "discrete-ppo",
         }
     }
 
     /// Checks every size against what can be built for this observation.
+    ///
+    /// # Errors
+    /// The first size that is out of range.
     pub fn validate(&self, shape: ObservationShape, parameter_scale_s: f64) -> Result<()> {
         if shape.is_empty() {
             return Err(setting("environment", format!("{shape:?}"), "an observation with numbers in it"));
@@ -116,35 +120,33 @@ impl NetworkConfig {
             }
         }
         match self {
-            NetworkConfig::HopPpo(sizes) => sizes.validate(),
-            NetworkConfig::HopPpoMlp(HopPpoMlp { encoder, .. }) | NetworkConfig::HPpo(HPpo { encoder, .. })
-                if encoder.is_empty() =>
-            {
+            Self::HopPpo(sizes) => sizes.validate(),
+            Self::HopPpoMlp(HopPpoMlp { encoder, .. }) | Self::HPpo(HPpo { encoder, .. }) if encoder.is_empty() => {
                 Err(setting("network.encoder", "[]".into(), "at least one layer"))
             }
-            NetworkConfig::DiscretePpo(sizes) => sizes.levels(parameter_scale_s).map(|_| ()),
+            Self::DiscretePpo(sizes) => sizes.levels(parameter_scale_s).map(|_| ()),
             _ => Ok(()),
         }
     }
 
     fn layers(&self) -> Vec<(&'static str, &[usize])> {
         match self {
-            NetworkConfig::HopPpo(it) => {
+            Self::HopPpo(it) => {
                 vec![("discrete", &it.discrete), ("continuous", &it.continuous), ("critic", &it.critic)]
             }
-            NetworkConfig::HopPpoMlp(it) => vec![
+            Self::HopPpoMlp(it) => vec![
                 ("encoder", &it.encoder),
                 ("discrete", &it.discrete),
                 ("continuous", &it.continuous),
                 ("critic", &it.critic),
             ],
-            NetworkConfig::HPpo(it) => vec![
+            Self::HPpo(it) => vec![
                 ("encoder", &it.encoder),
                 ("discrete", &it.discrete),
                 ("continuous", &it.continuous),
                 ("critic", &it.critic),
             ],
-            NetworkConfig::DiscretePpo(it) => {
+            Self::DiscretePpo(it) => {
                 vec![("discrete", &it.discrete), ("critic", &it.critic)]
             }
         }
@@ -170,6 +172,9 @@ impl HopPpo {
 
 impl DiscretePpo {
     /// Number of transition times on the grid from 0 to the longest, both included.
+    ///
+    /// # Errors
+    /// A distance that does not divide the longest.
     pub fn levels(&self, parameter_scale_s: f64) -> Result<usize> {
         let steps = parameter_scale_s / self.granularity_s;
         let whole = (steps - steps.round()).abs() < 1e-9;

@@ -16,8 +16,8 @@ pub struct Linear {
 
 impl Linear {
     /// Declares the layer's two tensors.
-    pub fn new(layout: &mut Layout, name: &str, inputs: usize, outputs: usize, gain: f64) -> Linear {
-        Linear {
+    pub fn new(layout: &mut Layout, name: &str, inputs: usize, outputs: usize, gain: f64) -> Self {
+        Self {
             weight: layout.matrix(&format!("{name}.weight"), outputs, inputs, gain),
             bias: layout.vector(&format!("{name}.bias"), outputs, 0.0),
         }
@@ -39,8 +39,8 @@ pub struct LayerNorm {
 
 impl LayerNorm {
     /// Declares scale 1 and shift 0.
-    pub fn new(layout: &mut Layout, name: &str, width: usize) -> LayerNorm {
-        LayerNorm {
+    pub fn new(layout: &mut Layout, name: &str, width: usize) -> Self {
+        Self {
             scale: layout.vector(&format!("{name}.weight"), width, 1.0),
             shift: layout.vector(&format!("{name}.bias"), width, 0.0),
             width: width as i64,
@@ -71,10 +71,10 @@ impl Mlp {
         hidden: &[usize],
         outputs: usize,
         output_gain: f64,
-    ) -> Mlp {
+    ) -> Self {
         let (hidden, width) = stack(layout, name, inputs, hidden);
         let output = Linear::new(layout, &format!("{name}.output"), width, outputs, output_gain);
-        Mlp { hidden, output }
+        Self { hidden, output }
     }
 
     /// [..., inputs] to [..., outputs].
@@ -94,9 +94,9 @@ pub struct Trunk {
 
 impl Trunk {
     /// Declares the layers.
-    pub fn new(layout: &mut Layout, name: &str, inputs: usize, hidden: &[usize]) -> Trunk {
+    pub fn new(layout: &mut Layout, name: &str, inputs: usize, hidden: &[usize]) -> Self {
         let (hidden, width) = stack(layout, name, inputs, hidden);
-        Trunk { hidden, width }
+        Self { hidden, width }
     }
 
     /// [..., inputs] to [..., width].

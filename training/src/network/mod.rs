@@ -61,7 +61,7 @@ impl Network {
     ///
     /// # Errors
     /// A size that cannot be built.
-    pub fn new(config: &NetworkConfig, shape: ObservationShape, parameter_scale_s: f64) -> Result<(Network, Layout)> {
+    pub fn new(config: &NetworkConfig, shape: ObservationShape, parameter_scale_s: f64) -> Result<(Self, Layout)> {
         config.validate(shape, parameter_scale_s)?;
         let mut layout = Layout::default();
         let levels = match config {
@@ -74,31 +74,36 @@ impl Network {
             NetworkConfig::HPpo(sizes) => h(&mut layout, sizes, shape),
             NetworkConfig::DiscretePpo(sizes) => discrete(&mut layout, sizes, shape, levels),
         };
-        let network = Network { body, shape, levels, hybrid: !matches!(config, NetworkConfig::DiscretePpo(_)) };
+        let network = Self { body, shape, levels, hybrid: !matches!(config, NetworkConfig::DiscretePpo(_)) };
         Ok((network, layout))
     }
 
     /// Size of the observations it takes.
+    #[must_use]
     pub fn shape(&self) -> ObservationShape {
         self.shape
     }
 
     /// Number of discrete choices.
+    #[must_use]
     pub fn choices(&self) -> usize {
         self.shape.tokens * self.levels
     }
 
     /// Whether it has a continuous actor.
+    #[must_use]
     pub fn is_hybrid(&self) -> bool {
         self.hybrid
     }
 
     /// Whether its two actors are trained with an objective each (H-PPO) or jointly (eq. 20).
+    #[must_use]
     pub fn has_separate_objectives(&self) -> bool {
         matches!(self.body, Body::H { .. })
     }
 
     /// The token of a choice, and the parameter that the choice fixes, if any.
+    #[must_use]
     pub fn decode(&self, choice: usize) -> (usize, Option<f64>) {
         if self.hybrid {
             return (choice, None);
@@ -109,6 +114,7 @@ impl Network {
     }
 
     /// The choice that comes closest to an action; the inverse of [`Network::decode`].
+    #[must_use]
     pub fn encode(&self, token: usize, parameter: f64) -> usize {
         if self.hybrid {
             return token;
@@ -158,6 +164,7 @@ impl Network {
 
     /// The distribution of the transition for the chosen tokens, [batch] of i64; `None` for a
     /// network without a continuous actor.
+    #[must_use]
     pub fn transition(
         &self,
         parameters: &Parameters,

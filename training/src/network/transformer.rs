@@ -45,11 +45,11 @@ struct EncoderLayer {
 
 impl Transformer {
     /// Declares the encoder's tensors.
-    pub fn new(layout: &mut Layout, name: &str, size: TransformerSize) -> Transformer {
+    pub fn new(layout: &mut Layout, name: &str, size: TransformerSize) -> Self {
         let embed = Linear::new(layout, &format!("{name}.embed"), size.features, size.dim, 1.0);
         let layers =
             (0..size.layers).map(|index| EncoderLayer::new(layout, &format!("{name}.layer{index}"), size)).collect();
-        Transformer {
+        Self {
             embed,
             layers,
             norm: LayerNorm::new(layout, &format!("{name}.norm"), size.dim),
@@ -72,10 +72,10 @@ impl Transformer {
 }
 
 impl EncoderLayer {
-    fn new(layout: &mut Layout, name: &str, size: TransformerSize) -> EncoderLayer {
+    fn new(layout: &mut Layout, name: &str, size: TransformerSize) -> Self {
         let dim = size.dim;
         let part = |part: &str| format!("{name}.{part}");
-        EncoderLayer {
+        Self {
             norm_attention: LayerNorm::new(layout, &part("norm_attention"), dim),
             query_key_value: Linear::new(layout, &part("query_key_value"), dim, 3 * dim, 1.0),
             project: Linear::new(layout, &part("project"), dim, dim, 1.0),

@@ -2,10 +2,9 @@
 
 use super::super::{Decision, DecisionContext, Planner, PlannerError};
 use super::search::Search;
-use super::wait_for_a_window;
-use super::{Allowance, Experience};
-use crate::catalogue::Candidate;
-use crate::flight::Situation;
+use super::{Allowance, Experience, wait_for_a_window};
+use crate::requests::catalogue::Candidate;
+use crate::vehicle::flight::Situation;
 
 /// Beam search planner.
 #[derive(Clone, Debug, Default)]

@@ -1,9 +1,9 @@
 //! What a planner learns of the satellite from how its own tasks went.
 
 use super::super::{Decision, DecisionContext};
-use crate::guidance::FailureReason;
-use crate::strip::StripId;
+use crate::task::FailureReason;
 use crate::time::Tick;
+use crate::world::strip::StripId;
 
 /// By how much weaker the wheels are taken to be after a failure, as a share of their torque limit.
 const STEP: f64 = 0.02;
@@ -107,9 +107,9 @@ mod tests {
 
     use super::*;
     use crate::config::SimConfig;
-    use crate::env::{Env, EpisodeConfig, TaskRecord};
-    use crate::guidance::TaskOutcome;
+    use crate::learn::episode::{Env, EpisodeConfig};
     use crate::model::Model;
+    use crate::task::{TaskOutcome, TaskRecord};
 
     fn env() -> Env {
         let episode = EpisodeConfig { orbits: 0.1, ..EpisodeConfig::default() };
@@ -127,7 +127,6 @@ mod tests {
             t_pre,
             t_acq: 0,
             outcome: TaskOutcome { failure, ..TaskOutcome::NOT_BEGUN },
-            reward: 0.0,
         }
     }
 

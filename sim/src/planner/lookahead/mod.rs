@@ -10,7 +10,7 @@ pub use experience::{Allowance, Experience};
 pub use search::{Found, Search};
 
 use super::{Decision, DecisionContext, Planner, PlannerError, wait};
-use crate::catalogue::Candidate;
+use crate::requests::catalogue::Candidate;
 
 /// Lookahead planner.
 ///

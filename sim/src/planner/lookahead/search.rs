@@ -1,11 +1,11 @@
 //! The shortest transition with which a strip is imaged, found by flying it.
 
 use super::Allowance;
-use crate::catalogue::Candidate;
-use crate::flight::{Flight, Situation};
-use crate::guidance::Task;
 use crate::model::Model;
+use crate::requests::catalogue::Candidate;
+use crate::task::Task;
 use crate::time::Tick;
+use crate::vehicle::flight::{Flight, Situation};
 
 /// The transition is settled once the attitude error is below this share of its limit.
 const SETTLED_SHARE: f64 = 0.8;
@@ -41,7 +41,7 @@ impl<'a> Search<'a> {
     pub fn new(model: &'a Model, situation: &Situation, allowance: &Allowance) -> Self {
         let mut flight = Flight::predicted(model, situation);
         if allowance.weakness > 0.0 {
-            flight.differ(model.plant.weakened(allowance.weakness), None);
+            flight.spacecraft.refit(model.plant.weakened(allowance.weakness));
         }
         let mut begin = *situation;
         if allowance.delay > 0 {
@@ -126,7 +126,7 @@ impl<'a> Search<'a> {
     /// Where the whole task ends, if it succeeds.
     pub fn image(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32) -> Option<Situation> {
         self.flight.rewind(from);
-        let task = Task::Image { strip: candidate.strip, t_pre, t_acq: candidate.t_acq };
+        let task = Task::Image { id: candidate.id, strip: candidate.strip, t_pre, t_acq: candidate.t_acq };
         self.ticks += u64::from(task.ticks());
         let outcome = self.flight.fly(task, Tick(u64::MAX));
         outcome.failure.is_none().then(|| self.flight.situation())
@@ -134,7 +134,7 @@ impl<'a> Search<'a> {
 
     fn begin(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32) {
         self.flight.rewind(from);
-        let task = Task::Image { strip: candidate.strip, t_pre, t_acq: candidate.t_acq };
-        self.flight.guidance.start(task, from.now, &from.body);
+        let task = Task::Image { id: candidate.id, strip: candidate.strip, t_pre, t_acq: candidate.t_acq };
+        self.flight.begin(task);
     }
 }

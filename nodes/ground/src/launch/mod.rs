@@ -1,0 +1,148 @@
+//! The launcher: starts the nodes of a mission, watches them, and leaves its outputs.
+
+mod fleet;
+mod output;
+mod over_dds;
+mod progress;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use swath_sim::planner::{Planner, PlannerSpec};
+use swath_sim::requests::scenario::ScenarioConfig;
+use swath_sim::task::Totals;
+
+use output::OutputFolder;
+use progress::Progress;
+use swath_mission::approval::{Gate, GatedPlanner};
+use swath_mission::file::Mission;
+use swath_mission::guarded::{GuardedPlanner, Policies};
+use swath_mission::in_process::InProcessMission;
+use swath_mission::outcome::{Summary, SummaryInputs};
+
+/// `swath launch`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  swath launch examples/missions/one_orbit.toml --out out/one\n  \
+    swath launch examples/missions/one_orbit.toml --in-process --seed 7")]
+pub struct LaunchArgs {
+    /// Mission file (TOML).
+    pub mission: PathBuf,
+    /// Folder for bag, tasks and summary; it must be empty or not exist [default: out/NAME-SEED-N].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Fly in this process, without DDS and without a bag.
+    #[arg(long)]
+    pub in_process: bool,
+    /// Do not record a bag.
+    #[arg(long)]
+    pub no_bag: bool,
+    /// Length [orbits] instead of the mission's.
+    #[arg(long)]
+    pub orbits: Option<f64>,
+    /// Number of random strips instead of the mission's.
+    #[arg(long)]
+    pub requests: Option<u32>,
+    /// Planner instead of the mission's.
+    #[arg(long)]
+    pub planner: Option<PlannerSpec>,
+    /// Seed instead of the mission's.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// 0: lockstep; 1: real time; x: x times real time; instead of the mission's.
+    #[arg(long)]
+    pub pace: Option<f64>,
+    /// Print the summary as JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl LaunchArgs {
+    fn mission(&self) -> Result<Mission> {
+        let mut mission = Mission::read(&self.mission)?;
+        if let Some(orbits) = self.orbits {
+            mission.orbits = orbits;
+        }
+        if let Some(count) = self.requests {
+            let scenario = mission.requests.random.take().unwrap_or_default();
+            mission.requests.random = Some(ScenarioConfig { count: [count, count], ..scenario });
+        }
+        if let Some(planner) = &self.planner {
+            mission.planner = planner.clone();
+            mission.planner.resolve(&std::env::current_dir()?);
+        }
+        if let Some(seed) = self.seed {
+            mission.seed = seed;
+        }
+        if let Some(pace) = self.pace {
+            mission.pace = pace;
+        }
+        mission.validate()?;
+        Ok(mission.resolved())
+    }
+}
+
+/// Flies a mission and prints its summary.
+///
+/// # Errors
+/// When the mission is not valid, a node fails or never comes up, or an output cannot be written.
+#[expect(clippy::print_stdout, reason = "the summary is this command's result")]
+pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<()> {
+    let mission = args.mission()?;
+    let requests = mission.initial_requests()?;
+    let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
+    let mission_file = output.write_mission(&mission, &requests)?;
+    // What is flown is what was written: nodes, in-process missions and re-flights read the same file.
+    let mission = Mission::read(&mission_file)?;
+    let summary = if args.in_process {
+        fly_in_process(&mission, &mut output, policies)?
+    } else {
+        over_dds::fly(&mission, &mission_file, &mut output, !args.no_bag, policies)?
+    };
+    output.write_summary(&summary)?;
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&summary)?);
+    } else {
+        println!("{}\n  outputs              {}", summary.table().trim_end(), output.path().display());
+    }
+    Ok(())
+}
+
+fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Policies) -> Result<Summary> {
+    let mut flight = InProcessMission::new(mission)?;
+    let planner = GuardedPlanner::make(policies, &mission.planner, mission.seed);
+    if let Some(reason) = planner.missing() {
+        tracing::error!("no planner {}: {reason}; {} takes over", mission.planner, planner.name());
+    }
+    let period = flight.model().period;
+    let mut planner = GatedPlanner { gate: Gate::new(&mission.approval, period), planner };
+    let horizon = mission.horizon(flight.model());
+    let mut totals = Totals::default();
+    let mut progress = Progress::new(horizon, period);
+    let started = Instant::now();
+    let mut failed = None;
+    flight.run(&mut planner, |settled, line| {
+        totals.add(settled);
+        progress.task(settled.record.end, &totals);
+        if let Err(error) = output.write_task(&line) {
+            failed.get_or_insert(error);
+        }
+    })?;
+    progress.finish();
+    if let Some(error) = failed {
+        return Err(error).context("cannot write tasks.jsonl");
+    }
+    let (requested, accepted) = flight.counts();
+    let inputs = SummaryInputs {
+        planner: mission.planner.to_string(),
+        seed: mission.seed,
+        orbits: mission.orbits,
+        ticks: horizon.0,
+        wall_seconds: started.elapsed().as_secs_f64(),
+        requests: requested as u64,
+        accepted: accepted as u64,
+        ..SummaryInputs::default()
+    };
+    Ok(Summary::new(inputs, &totals, period))
+}

@@ -1,0 +1,77 @@
+//! The folder that a mission leaves behind.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use swath_mission::file::{Mission, MissionRequests};
+use swath_mission::orders::geojson;
+use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::outcome::{Summary, TaskLine};
+
+/// Where bag, tasks and summary go.
+pub struct OutputFolder {
+    path: PathBuf,
+    tasks: BufWriter<File>,
+}
+
+impl OutputFolder {
+    /// Makes the folder; without a path, a new one under `out/`.
+    pub fn create(path: Option<&Path>, mission: &Mission) -> Result<Self> {
+        let path = match path {
+            Some(path) => path.to_owned(),
+            None => unused_name(mission),
+        };
+        fs::create_dir_all(&path).with_context(|| format!("cannot make output folder {}", path.display()))?;
+        let mut entries = fs::read_dir(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        if entries.next().is_some() {
+            bail!("output folder {} is not empty: choose another with --out", path.display());
+        }
+        let tasks = path.join("tasks.jsonl");
+        let tasks = File::create(&tasks).with_context(|| format!("cannot write {}", tasks.display()))?;
+        Ok(Self { path, tasks: BufWriter::new(tasks) })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes the mission as it is flown: `mission.toml`, and all its requests in `requests.geojson` beside it.
+    pub fn write_mission(&self, mission: &Mission, requests: &[NamedRequest]) -> Result<PathBuf> {
+        geojson::write(&self.path.join("requests.geojson"), requests)?;
+        let files = vec![PathBuf::from("requests.geojson")];
+        let mission = Mission {
+            requests: MissionRequests { files, random: None, ..mission.requests.clone() },
+            ..mission.clone()
+        };
+        let path = self.path.join("mission.toml");
+        fs::write(&path, toml::to_string(&mission)?).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+
+    /// Appends a line to `tasks.jsonl`.
+    pub fn write_task(&mut self, line: &TaskLine) -> Result<()> {
+        serde_json::to_writer(&mut self.tasks, line)?;
+        self.tasks.write_all(b"\n")?;
+        Ok(self.tasks.flush()?)
+    }
+
+    /// Writes `summary.json`.
+    pub fn write_summary(&self, summary: &Summary) -> Result<()> {
+        let path = self.path.join("summary.json");
+        let mut text = serde_json::to_string_pretty(summary)?;
+        text.push('\n');
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+fn unused_name(mission: &Mission) -> PathBuf {
+    let name: String =
+        mission.name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    let name = if name.is_empty() { "mission".to_owned() } else { name };
+    let mut paths = (1..).map(|number| PathBuf::from(format!("out/{name}-{}-{number}", mission.seed)));
+    paths.find(|path| !path.exists()).unwrap_or_default()
+}

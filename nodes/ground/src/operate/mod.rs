@@ -1,0 +1,105 @@
+//! `swath strips` and `swath planner`: an operator's command line to a flying mission.
+
+mod client;
+mod export;
+mod planner;
+mod query;
+mod show;
+mod submit;
+mod watch;
+
+pub use planner::{PlannerArgs, run as run_planner};
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+/// `swath strips`.
+#[derive(Debug, Args)]
+pub struct StripsArgs {
+    #[command(subcommand)]
+    command: StripsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum StripsCommand {
+    /// Submit the strips of GeoJSON files; exits with 1 when one of them is refused.
+    #[command(after_help = "Example: swath strips submit examples/requests/rivers.geojson --submitter ops")]
+    Submit(submit::SubmitArgs),
+    /// Say when strips of a file, or a known one, could be imaged.
+    #[command(after_help = "Example: swath strips preview examples/requests/fires.geojson --hours 6")]
+    Preview(query::PreviewArgs),
+    /// List strips by state, area and time.
+    #[command(after_help = "Example: swath strips list --state accepted --area 35,70,-10,40")]
+    List(query::ListArgs),
+    /// Show all that is known of a strip: chances, attempts, history.
+    Show(query::ShowArgs),
+    /// Take strips back; refused once imaging has begun.
+    Cancel(submit::DecideArgs),
+    /// Replace a strip by the one of a GeoJSON file.
+    Replace(submit::ReplaceArgs),
+    /// Keep accepted strips from being imaged until they are released.
+    Hold(submit::DecideArgs),
+    /// Accept strips that are held.
+    Release(submit::DecideArgs),
+    /// Refuse strips that are held.
+    Reject(submit::DecideArgs),
+    /// Watch requests change, until Ctrl-C.
+    Watch(watch::WatchArgs),
+    /// Write every strip with its history as GeoJSON, or the audit trail as JSON lines.
+    #[command(after_help = "Examples:\n  swath strips export --out strips.geojson\n  \
+        swath strips export --trail --store out/one/requests.sqlite")]
+    Export(export::ExportArgs),
+}
+
+/// Who acts.
+#[derive(Debug, Args)]
+struct Actor {
+    /// Who asks for it.
+    #[arg(long, default_value = "operator")]
+    actor: String,
+    /// Why.
+    #[arg(long, default_value = "")]
+    reason: String,
+}
+
+/// Runs `swath strips`.
+///
+/// # Errors
+/// When a file cannot be used, the request manager does not answer, or something is refused.
+pub fn run_strips(args: &StripsArgs) -> Result<()> {
+    use swath_msgs::swath_msgs::ReviewStripsRequest as Review;
+    match &args.command {
+        StripsCommand::Submit(args) => submit::submit(args),
+        StripsCommand::Preview(args) => query::preview(args),
+        StripsCommand::List(args) => query::list(args),
+        StripsCommand::Show(args) => query::show(args),
+        StripsCommand::Cancel(args) => submit::cancel(args),
+        StripsCommand::Replace(args) => submit::replace(args),
+        StripsCommand::Hold(args) => submit::review(args, Review::ACTION_HOLD),
+        StripsCommand::Release(args) => submit::review(args, Review::ACTION_RELEASE),
+        StripsCommand::Reject(args) => submit::review(args, Review::ACTION_REJECT),
+        StripsCommand::Watch(args) => watch::watch(args),
+        StripsCommand::Export(args) => export::export(args),
+    }
+}
+
+/// Reads the strips of GeoJSON files; features that are no strips are told on stderr.
+fn read_files(
+    files: &[PathBuf],
+    lengths: swath_mission::orders::geojson::Lengths,
+) -> Result<swath_mission::orders::geojson::Import> {
+    let mut all = swath_mission::orders::geojson::Import::default();
+    for file in files {
+        let import = swath_mission::orders::geojson::import(file, lengths)?;
+        for (feature, reason) in &import.refused {
+            eprintln!("requests {}, feature {feature}: {reason}", file.display());
+        }
+        all.lines += import.lines;
+        all.requests.extend(import.requests);
+        all.cut.extend(import.cut);
+        all.refused.extend(import.refused);
+    }
+    Ok(all)
+}

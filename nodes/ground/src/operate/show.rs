@@ -1,0 +1,243 @@
+//! Requests as tables for people and as JSON for machines.
+
+use anyhow::Result;
+use serde_json::{Value, json};
+use swath_msgs::builtin_interfaces::Time;
+use swath_msgs::swath_msgs as msg;
+
+use swath_mission::requests::lifecycle::State;
+use swath_mission::time_text;
+use swath_node::stamp::nanoseconds;
+
+/// Name of a state.
+pub fn state_name(number: u8) -> &'static str {
+    State::from_number(number).map_or("unknown", State::name)
+}
+
+/// A time, or a dash without one.
+pub fn time(time: &Time) -> String {
+    if *time == Time::default() { "-".to_owned() } else { time_text::format(nanoseconds(time)) }
+}
+
+fn time_json(at: &Time) -> Value {
+    if *at == Time::default() { Value::Null } else { time(at).into() }
+}
+
+/// Prints what became of a request or of what was asked of it.
+#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
+pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
+    if as_json {
+        let line = json!({
+            "name": name, "accepted": result.accepted, "id": result.id,
+            "reason_code": result.reason_code, "reason": result.reason,
+        });
+        println!("{}", serde_json::to_string(&line)?);
+    } else if result.accepted {
+        println!("{done:<9} {:>7}  {name}", result.id);
+    } else {
+        println!("refused   {:>7}  {name}: {} (reason {})", "-", result.reason, result.reason_code);
+    }
+    Ok(())
+}
+
+/// Where a request stands, for machines.
+pub fn status_json(status: &msg::StripStatus) -> Value {
+    let strip = &status.strip;
+    json!({
+        "id": strip.id,
+        "name": strip.name,
+        "client_ref": status.client_ref,
+        "submitter": status.submitter,
+        "start": [strip.start_longitude_deg, strip.start_latitude_deg],
+        "end": [strip.end_longitude_deg, strip.end_latitude_deg],
+        "priority": strip.priority,
+        "acquisition_speed_m_s": strip.acquisition_speed,
+        "state": state_name(status.state),
+        "reason_code": status.reason_code,
+        "reason": status.reason,
+        "actor": status.actor,
+        "changed": time_json(&status.header.stamp),
+        "tick": status.tick,
+        "created_tick": status.created_tick,
+        "attempts": status.attempts,
+        "reward": status.reward,
+        "window_open": time_json(&status.window_open),
+        "window_close": time_json(&status.window_close),
+        "imaging": time_json(&status.imaging),
+        "linked_to": status.linked_to,
+        "supersedes": status.supersedes,
+        "superseded_by": status.superseded_by,
+    })
+}
+
+/// Head of a table of requests.
+pub fn status_head() -> String {
+    format!(
+        "{:>7}  {:<19} {:>4} {:>3}  {:<20}  {:<20}  {:<20}  name",
+        "id", "state", "prio", "att", "window opens", "window closes", "imaging"
+    )
+}
+
+/// A request as a line of a table.
+pub fn status_line(status: &msg::StripStatus) -> String {
+    let reason = if status.reason.is_empty() { String::new() } else { format!(": {}", status.reason) };
+    format!(
+        "{:>7}  {:<19} {:>4.2} {:>3}  {:<20}  {:<20}  {:<20}  {}{reason}",
+        status.strip.id,
+        state_name(status.state),
+        status.strip.priority,
+        status.attempts,
+        time(&status.window_open),
+        time(&status.window_close),
+        time(&status.imaging),
+        status.strip.name,
+    )
+}
+
+/// A chance, for machines.
+pub fn opportunity_json(opportunity: &msg::Opportunity) -> Value {
+    json!({
+        "window_open": time_json(&opportunity.window_open),
+        "window_close": time_json(&opportunity.window_close),
+        "window_open_tick": opportunity.window_open_tick,
+        "window_close_tick": opportunity.window_close_tick,
+        "t_acq_ticks": opportunity.t_acq_ticks,
+        "min_elevation_deg": opportunity.min_elevation.to_degrees(),
+        "transition_ticks": opportunity.transition_found.then_some(opportunity.transition_ticks),
+        "conflicts": opportunity.conflicts,
+        "conflict_ids": opportunity.conflict_ids.to_vec(),
+    })
+}
+
+/// Chances as a table.
+pub fn opportunity_table(opportunities: &[msg::Opportunity]) -> String {
+    let head = format!(
+        "  {:<24}  {:<24}  {:>9} {:>9} {:>10}  conflicts\n",
+        "window opens", "window closes", "elevation", "acquire", "transition"
+    );
+    let lines = opportunities.iter().map(|it| {
+        let transition = if it.transition_found { format!("{} ticks", it.transition_ticks) } else { "-".to_owned() };
+        format!(
+            "  {:<24}  {:<24}  {:>8.1}° {:>3} ticks {:>10}  {}\n",
+            time(&it.window_open),
+            time(&it.window_close),
+            it.min_elevation.to_degrees(),
+            it.t_acq_ticks,
+            transition,
+            it.conflicts,
+        )
+    });
+    std::iter::once(head).chain(lines).collect()
+}
+
+/// A line of the audit trail, for machines.
+pub fn history_json(entry: &msg::HistoryEntry) -> Value {
+    json!({
+        "sequence": entry.sequence,
+        "strip": entry.strip_id,
+        "client_ref": entry.client_ref,
+        "name": entry.name,
+        "time": time_json(&entry.stamp),
+        "tick": entry.tick,
+        "state": state_name(entry.state),
+        "reason_code": entry.reason_code,
+        "reason": entry.reason,
+        "actor": entry.actor,
+    })
+}
+
+fn attempt_state(state: u8) -> &'static str {
+    match state {
+        msg::Attempt::STATE_PLANNED => "planned",
+        msg::Attempt::STATE_TRANSITIONING => "transitioning",
+        msg::Attempt::STATE_ACQUIRING => "acquiring",
+        msg::Attempt::STATE_SUCCEEDED => "succeeded",
+        msg::Attempt::STATE_FAILED => "failed",
+        _ => "cancelled",
+    }
+}
+
+fn attempt_json(attempt: &msg::Attempt) -> Value {
+    json!({
+        "strip": attempt.strip_id,
+        "task": attempt.task,
+        "start_tick": attempt.start_tick,
+        "end_tick": attempt.end_tick,
+        "t_pre_ticks": attempt.t_pre_ticks,
+        "t_acq_ticks": attempt.t_acq_ticks,
+        "state": attempt_state(attempt.state),
+        "reason_code": attempt.reason_code,
+        "max_attitude_error": attempt.max_attitude_error,
+        "min_elevation_deg": attempt.min_elevation.to_degrees(),
+        "reward": attempt.reward,
+    })
+}
+
+/// All that is known of a request, for machines.
+pub fn report_json(report: &msg::StripReport) -> Value {
+    json!({
+        "status": status_json(&report.status),
+        "bidirectional": report.request.bidirectional,
+        "valid_from": time_json(&report.request.valid_from),
+        "valid_until": time_json(&report.request.valid_until),
+        "max_attempts": report.request.max_attempts,
+        "opportunities": report.opportunities.iter().map(opportunity_json).collect::<Vec<_>>(),
+        "attempts": report.attempts.iter().map(attempt_json).collect::<Vec<_>>(),
+        "history": report.history.iter().map(history_json).collect::<Vec<_>>(),
+    })
+}
+
+/// All that is known of a request, for people.
+pub fn report_text(report: &msg::StripReport) -> String {
+    let (status, strip) = (&report.status, &report.status.strip);
+    let mut text = format!(
+        "strip {} {}\n  {} since {}{}\n  from {:.4}° {:.4}° to {:.4}° {:.4}°, priority {}, {} m/s, by {} ({})\n",
+        strip.id,
+        strip.name,
+        state_name(status.state),
+        time(&status.header.stamp),
+        if status.reason.is_empty() { String::new() } else { format!(": {}", status.reason) },
+        strip.start_latitude_deg,
+        strip.start_longitude_deg,
+        strip.end_latitude_deg,
+        strip.end_longitude_deg,
+        strip.priority,
+        strip.acquisition_speed,
+        status.submitter,
+        status.client_ref,
+    );
+    for (what, id) in
+        [("linked to", status.linked_to), ("replaces", status.supersedes), ("replaced by", status.superseded_by)]
+    {
+        if id != 0 {
+            text += &format!("  {what} strip {id}\n");
+        }
+    }
+    text += "chances\n";
+    text += &opportunity_table(&report.opportunities);
+    text += "attempts\n";
+    for attempt in &report.attempts {
+        text += &format!(
+            "  task {} ticks {} to {}: {} {}, attitude error {:.3}, elevation {:.1}°\n",
+            attempt.task,
+            attempt.start_tick,
+            attempt.end_tick,
+            attempt_state(attempt.state),
+            if attempt.reason_code == 0 { String::new() } else { format!("(reason {})", attempt.reason_code) },
+            attempt.max_attitude_error,
+            attempt.min_elevation.to_degrees(),
+        );
+    }
+    text += "history\n";
+    for entry in &report.history {
+        text += &format!(
+            "  {}  strip {} {} by {}{}\n",
+            time(&entry.stamp),
+            entry.strip_id,
+            state_name(entry.state),
+            entry.actor,
+            if entry.reason.is_empty() { String::new() } else { format!(": {}", entry.reason) },
+        );
+    }
+    text
+}

@@ -1,0 +1,308 @@
+//! Messages about strip requests: values that come in are checked by the request manager, each with its reason.
+
+use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::requests::index::Area;
+use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome, failure_reason};
+use swath_mission::requests::lifecycle::State;
+use swath_mission::requests::logic::{Abort, Offer, Request, RequestLogic, Review};
+use swath_mission::requests::query::{Filter, Opportunity};
+use swath_mission::requests::refusal::Refusal;
+use swath_msgs::builtin_interfaces::Time;
+use swath_msgs::swath_msgs as msg;
+use swath_node::stamp::{EARTH_FRAME, Stamper};
+use swath_sim::requests::catalogue::Candidate;
+use swath_sim::time::Tick;
+use swath_sim::world::strip::StripId;
+
+use super::store::HistoryLine;
+
+/// A task that images a strip; `None` for a wait.
+#[must_use]
+pub fn in_flight(task: &msg::ImagingTask) -> Option<InFlight> {
+    (task.kind == msg::ImagingTask::KIND_IMAGE).then_some(InFlight {
+        task: task.task,
+        id: StripId(task.strip.id),
+        start: Tick(task.start_tick),
+        t_pre: task.t_pre_ticks,
+        t_acq: task.t_acq_ticks,
+    })
+}
+
+/// What is decided on a request.
+///
+/// # Errors
+/// When the action is none of the constants.
+pub fn review(action: u8) -> Result<Review, Refusal> {
+    use msg::ReviewStripsRequest as Call;
+    match action {
+        Call::ACTION_RELEASE => Ok(Review::Release),
+        Call::ACTION_REJECT => Ok(Review::Reject),
+        Call::ACTION_HOLD => Ok(Review::Hold),
+        other => Err(Refusal::Call { field: "action", value: f64::from(other), limits: "0 to 2" }),
+    }
+}
+
+/// Which requests are listed.
+///
+/// # Errors
+/// When a state is unknown or the area makes no sense.
+pub fn filter(stamper: &Stamper, call: &msg::ListStripsRequest) -> Result<Filter, Refusal> {
+    let state = |&number: &u8| {
+        State::from_number(number).ok_or(Refusal::Call { field: "state", value: f64::from(number), limits: "0 to 12" })
+    };
+    let states = call.states.iter().map(state).collect::<Result<_, _>>()?;
+    let area = if call.in_area { Some(area(call)?) } else { None };
+    let none = Time::default();
+    let between = if call.opportunity_from == none && call.opportunity_until == none {
+        None
+    } else {
+        let until =
+            if call.opportunity_until == none { Tick(u64::MAX) } else { stamper.tick_from(&call.opportunity_until) };
+        Some((stamper.tick_from(&call.opportunity_from), until))
+    };
+    Ok(Filter { states, area, between })
+}
+
+fn area(call: &msg::ListStripsRequest) -> Result<Area, Refusal> {
+    for (field, value, limit, limits) in [
+        ("south_deg", call.south_deg, 90.0, "-90 to 90"),
+        ("north_deg", call.north_deg, 90.0, "-90 to 90"),
+        ("west_deg", call.west_deg, 180.0, "-180 to 180"),
+        ("east_deg", call.east_deg, 180.0, "-180 to 180"),
+    ] {
+        if !(-limit..=limit).contains(&value) {
+            return Err(Refusal::Call { field, value, limits });
+        }
+    }
+    if call.south_deg > call.north_deg {
+        return Err(Refusal::Call { field: "south_deg", value: call.south_deg, limits: "-90 to north_deg" });
+    }
+    let (south_deg, north_deg) = (call.south_deg, call.north_deg);
+    Ok(Area { south_deg, north_deg, west_deg: call.west_deg, east_deg: call.east_deg })
+}
+
+/// A strip in a request's own degrees.
+#[must_use]
+pub fn strip(id: u64, named: &NamedRequest) -> msg::Strip {
+    let request = &named.request;
+    msg::Strip {
+        id,
+        name: named.name.clone(),
+        start_latitude_deg: request.start_latitude_deg,
+        start_longitude_deg: request.start_longitude_deg,
+        end_latitude_deg: request.end_latitude_deg,
+        end_longitude_deg: request.end_longitude_deg,
+        priority: request.priority,
+        acquisition_speed: request.acquisition_speed_m_s,
+    }
+}
+
+/// What the planner is offered; `request` gives what was asked for under an identity.
+#[must_use]
+pub fn upcoming_strips<'a>(
+    stamper: &Stamper,
+    offer: &Offer,
+    request: impl Fn(&Candidate) -> Option<&'a NamedRequest>,
+) -> msg::UpcomingStrips {
+    let candidates = offer.candidates.iter().filter_map(|candidate| {
+        Some(msg::Candidate {
+            strip: strip(candidate.id.0, request(candidate)?),
+            window_open_tick: candidate.window.open.0,
+            window_close_tick: candidate.window.close.0,
+            t_acq_ticks: candidate.t_acq,
+        })
+    });
+    msg::UpcomingStrips {
+        header: stamper.header(offer.tick, EARTH_FRAME),
+        tick: offer.tick.0,
+        task: offer.task,
+        candidates: candidates.collect::<Vec<_>>(),
+        pending: offer.pending as u64,
+        fulfilled: offer.fulfilled as u64,
+    }
+}
+
+/// Where a request stands now.
+#[must_use]
+pub fn strip_status(stamper: &Stamper, logic: &RequestLogic, id: StripId, request: &Request) -> msg::StripStatus {
+    let listed = logic.strip(id);
+    let window = listed
+        .filter(|_| !request.state.is_final())
+        .and_then(|listed| listed.windows_after(logic.now()).first().copied());
+    let standing = &request.standing;
+    msg::StripStatus {
+        header: stamper.header(request.changed, EARTH_FRAME),
+        strip: strip(id.0, &request.named),
+        client_ref: request.named.client_ref.clone(),
+        submitter: request.named.submitter.clone(),
+        state: request.state.number(),
+        reason_code: request.reason.0,
+        reason: request.reason.1.clone(),
+        actor: request.actor.clone(),
+        tick: request.changed.0,
+        created_tick: request.created.0,
+        attempts: standing.attempts,
+        reward: standing.reward,
+        window_open: window.map_or_else(Time::default, |window| stamper.time(window.open)),
+        window_close: window.map_or_else(Time::default, |window| stamper.time(window.close)),
+        imaging: time_unless_zero(stamper, standing.imaging),
+        linked_to: number(listed.and_then(|listed| listed.linked)),
+        supersedes: number(request.supersedes),
+        superseded_by: number(standing.superseded_by),
+    }
+}
+
+/// A change, with what else is known of its request now.
+#[must_use]
+pub fn change(stamper: &Stamper, logic: &RequestLogic, change: &Change) -> msg::StripStatus {
+    let known = logic.request(change.id).map(|request| strip_status(stamper, logic, change.id, request));
+    let status = known.unwrap_or_else(|| {
+        change.refused.as_ref().map_or_else(msg::StripStatus::default, |named| msg::StripStatus {
+            strip: strip(0, named),
+            client_ref: named.client_ref.clone(),
+            submitter: named.submitter.clone(),
+            created_tick: change.tick.0,
+            ..msg::StripStatus::default()
+        })
+    });
+    msg::StripStatus {
+        header: stamper.header(change.tick, EARTH_FRAME),
+        state: change.state.number(),
+        reason_code: change.reason.0,
+        reason: change.reason.1.clone(),
+        actor: change.actor.clone(),
+        tick: change.tick.0,
+        attempts: change.standing.attempts,
+        reward: change.standing.reward,
+        imaging: time_unless_zero(stamper, change.standing.imaging),
+        superseded_by: number(change.standing.superseded_by),
+        ..status
+    }
+}
+
+fn time_unless_zero(stamper: &Stamper, tick: Tick) -> Time {
+    if tick == Tick(0) { Time::default() } else { stamper.time(tick) }
+}
+
+fn number(id: Option<StripId>) -> u64 {
+    id.map_or(0, |id| id.0)
+}
+
+/// What became of a request or of what was asked of it.
+#[must_use]
+pub fn submit_result(result: Result<StripId, Refusal>) -> msg::SubmitResult {
+    match result {
+        Ok(id) => msg::SubmitResult { accepted: true, id: id.0, ..msg::SubmitResult::default() },
+        Err(refusal) => {
+            msg::SubmitResult { accepted: false, id: 0, reason_code: refusal.code(), reason: refusal.to_string() }
+        }
+    }
+}
+
+/// How many requests are in which state.
+#[must_use]
+pub fn request_summary(stamper: &Stamper, logic: &RequestLogic) -> msg::RequestSummary {
+    let count = |state| logic.count(state) as u64;
+    let now = logic.now();
+    msg::RequestSummary {
+        header: stamper.header(now, EARTH_FRAME),
+        tick: now.0,
+        received: count(State::Received),
+        rejected: count(State::Rejected),
+        held: count(State::Held),
+        accepted: count(State::Accepted),
+        scheduled: count(State::Scheduled),
+        executing: count(State::Executing),
+        completed: count(State::Completed),
+        cancelled_by_user: count(State::CancelledByUser),
+        cancelled_by_system: count(State::CancelledBySystem),
+        expired: count(State::Expired),
+        failed: count(State::Failed),
+        superseded: count(State::Superseded),
+        fulfilled_by_link: count(State::FulfilledByLink),
+        reward: logic.reward(),
+    }
+}
+
+/// A chance to image a strip.
+#[must_use]
+pub fn opportunity(stamper: &Stamper, opportunity: &Opportunity) -> msg::Opportunity {
+    msg::Opportunity {
+        window_open_tick: opportunity.window.open.0,
+        window_close_tick: opportunity.window.close.0,
+        window_open: stamper.time(opportunity.window.open),
+        window_close: stamper.time(opportunity.window.close),
+        t_acq_ticks: opportunity.t_acq,
+        min_elevation: opportunity.min_elevation,
+        transition_found: opportunity.transition.is_some(),
+        transition_ticks: opportunity.transition.unwrap_or(0),
+        conflicts: u32::try_from(opportunity.conflicts).unwrap_or(u32::MAX),
+        conflict_ids: opportunity.conflict_ids.iter().map(|id| id.0).collect::<Vec<_>>(),
+    }
+}
+
+/// An attempt that has ended.
+#[must_use]
+pub fn attempt(attempt: &Attempt) -> msg::Attempt {
+    let (state, reason_code) = match attempt.outcome {
+        Outcome::Succeeded => (msg::Attempt::STATE_SUCCEEDED, 0),
+        Outcome::Cancelled => (msg::Attempt::STATE_CANCELLED, 0),
+        Outcome::Failed(failure) => (msg::Attempt::STATE_FAILED, failure_reason(failure).0),
+    };
+    msg::Attempt {
+        strip_id: attempt.id.0,
+        task: attempt.task,
+        start_tick: attempt.start.0,
+        end_tick: attempt.end.0,
+        t_pre_ticks: attempt.t_pre,
+        t_acq_ticks: attempt.t_acq,
+        state,
+        reason_code,
+        max_attitude_error: attempt.max_attitude_error,
+        min_elevation: attempt.min_elevation,
+        reward: attempt.reward,
+    }
+}
+
+/// The attempt that is under way for a strip.
+#[must_use]
+pub fn attempt_under_way(logic: &RequestLogic, id: StripId) -> Option<msg::Attempt> {
+    let flown = logic.progress().in_flight.filter(|flown| flown.id == id)?;
+    let state = match (logic.state(id)?, logic.now() < flown.start) {
+        (State::Executing, _) => msg::Attempt::STATE_ACQUIRING,
+        (_, true) => msg::Attempt::STATE_PLANNED,
+        (_, false) => msg::Attempt::STATE_TRANSITIONING,
+    };
+    Some(msg::Attempt {
+        strip_id: id.0,
+        task: flown.task,
+        start_tick: flown.start.0,
+        t_pre_ticks: flown.t_pre,
+        t_acq_ticks: flown.t_acq,
+        state,
+        ..msg::Attempt::default()
+    })
+}
+
+/// A line of the audit trail.
+#[must_use]
+pub fn history_entry(stamper: &Stamper, line: &HistoryLine) -> msg::HistoryEntry {
+    msg::HistoryEntry {
+        sequence: line.sequence,
+        strip_id: line.id.0,
+        client_ref: line.client_ref.clone(),
+        name: line.name.clone(),
+        stamp: stamper.time(line.tick),
+        tick: line.tick.0,
+        state: line.state.number(),
+        reason_code: line.reason.0,
+        reason: line.reason.1.clone(),
+        actor: line.actor.clone(),
+    }
+}
+
+/// A task that is no longer wanted.
+#[must_use]
+pub fn task_abort(stamper: &Stamper, now: Tick, abort: Abort, reason: String) -> msg::TaskAbort {
+    msg::TaskAbort { header: stamper.header(now, EARTH_FRAME), task: abort.task, strip_id: abort.id.0, reason }
+}

@@ -1,0 +1,13 @@
+//! The request manager's node: its topics, its services, and the store that keeps what was acknowledged.
+
+mod desk;
+pub mod messages;
+mod outgoing;
+pub mod store;
+pub mod wiring;
+pub mod writer;
+
+#[cfg(test)]
+mod model_tests;
+#[cfg(test)]
+mod store_tests;

@@ -1,0 +1,553 @@
+//! The request manager's store: an SQLite file with every request, every change and every attempt.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row, params};
+use swath_sim::task::FailureReason;
+use swath_sim::time::Tick;
+use swath_sim::world::strip::{StripId, StripRequest};
+use swath_sim::world::windows::Window;
+use thiserror::Error;
+
+use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::requests::journal::{
+    Added, Attempt, Change, Entry, InFlight, Outcome, Progress, Standing, failure_reason,
+};
+use swath_mission::requests::lifecycle::State;
+use swath_mission::requests::logic::{Request, Stored};
+
+/// Why a store cannot be used.
+#[derive(Debug, Error)]
+pub enum StoreError {
+    /// SQLite cannot do what is asked.
+    #[error("store {path}: {source}")]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: rusqlite::Error,
+    },
+    /// The file was written by a later version.
+    #[error("store {path} has schema {found}, this program knows schemas up to {known}")]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// Its schema.
+        found: i64,
+        /// The latest that is known.
+        known: usize,
+    },
+    /// The file belongs to another mission.
+    #[error("store {path} belongs to another mission: give another file, or fly the mission that it was made for")]
+    OtherMission {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A value in the file makes no sense.
+    #[error("store {path}: request {id} has {what}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The request.
+        id: u64,
+        /// What is wrong.
+        what: &'static str,
+    },
+}
+
+/// Steps from each schema to the next; the first makes an empty file schema 1.
+const MIGRATIONS: [&str; 2] = [include_str!("schema_1.sql"), include_str!("schema_2.sql")];
+/// How long a connection waits for another one's lock.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// A connection to the store.
+pub struct Store {
+    connection: Connection,
+    path: PathBuf,
+}
+
+/// Everything that a request manager takes up again.
+#[derive(Debug)]
+pub struct Snapshot {
+    /// Whether the strips known from the start have been taken.
+    pub begun: bool,
+    /// Requests in the order of their numbers.
+    pub requests: Vec<Stored>,
+    /// Requests that were refused at once.
+    pub rejected: usize,
+    /// How far the mission has come.
+    pub progress: Progress,
+    /// The imaging task that was settled last, with its reward.
+    pub last_settled: Option<(u64, f64)>,
+}
+
+/// A change as the audit trail has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HistoryLine {
+    /// Number in the trail, from 1.
+    pub sequence: u64,
+    /// The request; 0 for one that was refused.
+    pub id: StripId,
+    /// Submitter's own reference.
+    pub client_ref: String,
+    /// Name for people.
+    pub name: String,
+    /// When.
+    pub tick: Tick,
+    /// State that it got.
+    pub state: State,
+    /// Reason code and text.
+    pub reason: (u16, String),
+    /// Who made the change.
+    pub actor: String,
+}
+
+/// When a transaction counts as written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Durability {
+    /// When it survives the end of this process.
+    Process,
+    /// When it survives the end of this machine.
+    Machine,
+}
+
+impl Store {
+    /// Opens a store for writing, or makes it; a file of an earlier schema is brought up to date. `mission` tells
+    /// missions apart.
+    ///
+    /// # Errors
+    /// When the file cannot be used, comes from a later version, or belongs to another mission.
+    pub fn open(path: &Path, mission: &str) -> Result<Self, StoreError> {
+        let store = Self::connect(path, OpenFlags::default())?;
+        store.migrate()?;
+        store.run("PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=2000; PRAGMA foreign_keys=ON;")?;
+        let sql = |source| store.error(source);
+        let known: Option<String> = store.setting("mission")?;
+        match known {
+            Some(known) if known != mission => return Err(StoreError::OtherMission { path: path.to_owned() }),
+            Some(_) => {}
+            None => {
+                let insert = "INSERT INTO settings (key, value) VALUES ('mission', ?1)";
+                store.connection.execute(insert, [mission]).map_err(sql)?;
+            }
+        }
+        Ok(store)
+    }
+
+    /// Opens a store that exists for reading.
+    ///
+    /// # Errors
+    /// When the file is not there, cannot be used, or has another schema.
+    pub fn open_read_only(path: &Path) -> Result<Self, StoreError> {
+        let store = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        let found = store.schema()?;
+        if found != MIGRATIONS.len() as i64 {
+            return Err(StoreError::Schema { path: path.to_owned(), found, known: MIGRATIONS.len() });
+        }
+        Ok(store)
+    }
+
+    fn connect(path: &Path, flags: OpenFlags) -> Result<Self, StoreError> {
+        let error = |source| StoreError::Sqlite { path: path.to_owned(), source };
+        let connection = Connection::open_with_flags(path, flags).map_err(error)?;
+        connection.busy_timeout(BUSY_TIMEOUT).map_err(error)?;
+        connection.set_prepared_statement_cache_capacity(32);
+        Ok(Self { connection, path: path.to_owned() })
+    }
+
+    /// Where the file is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn migrate(&self) -> Result<(), StoreError> {
+        let found = self.schema()?;
+        let known = MIGRATIONS.len();
+        let begin = usize::try_from(found).ok().filter(|&begin| begin <= known);
+        let begin = begin.ok_or(StoreError::Schema { path: self.path.clone(), found, known })?;
+        for (number, step) in (begin + 1..).zip(&MIGRATIONS[begin..]) {
+            self.run(&format!("BEGIN IMMEDIATE; {step} PRAGMA user_version={number}; COMMIT;"))?;
+        }
+        Ok(())
+    }
+
+    fn schema(&self) -> Result<i64, StoreError> {
+        self.connection.query_row("PRAGMA user_version", [], |row| row.get(0)).map_err(|source| self.error(source))
+    }
+
+    fn run(&self, sql: &str) -> Result<(), StoreError> {
+        self.connection.execute_batch(sql).map_err(|source| self.error(source))
+    }
+
+    fn error(&self, source: rusqlite::Error) -> StoreError {
+        StoreError::Sqlite { path: self.path.clone(), source }
+    }
+
+    fn setting(&self, key: &str) -> Result<Option<String>, StoreError> {
+        let select = "SELECT value FROM settings WHERE key = ?1";
+        self.connection.query_row(select, [key], |row| row.get(0)).optional().map_err(|source| self.error(source))
+    }
+
+    /// Writes lines of the journal and the progress in one transaction. From then on the strips known from the start
+    /// count as taken.
+    ///
+    /// # Errors
+    /// When they cannot be written; then none of them is.
+    pub fn write<'a>(
+        &mut self,
+        entries: impl Iterator<Item = &'a Entry>,
+        progress: &Progress,
+        durability: Durability,
+    ) -> Result<(), StoreError> {
+        let path = self.path.clone();
+        self.write_transaction(entries, progress, durability).map_err(|source| StoreError::Sqlite { path, source })
+    }
+
+    fn write_transaction<'a>(
+        &mut self,
+        entries: impl Iterator<Item = &'a Entry>,
+        progress: &Progress,
+        durability: Durability,
+    ) -> rusqlite::Result<()> {
+        self.connection.pragma_update(
+            None,
+            "synchronous",
+            match durability {
+                Durability::Process => "NORMAL",
+                Durability::Machine => "FULL",
+            },
+        )?;
+        let transaction = self.connection.transaction()?;
+        for entry in entries {
+            match entry {
+                Entry::Added(added) => insert_request(&transaction, added)?,
+                Entry::Changed(change) => insert_change(&transaction, change)?,
+                Entry::Attempted(attempt) => insert_attempt(&transaction, attempt)?,
+                // The changes that follow from it tell of it here.
+                Entry::Taken(_) => {}
+            }
+        }
+        write_progress(&transaction, progress)?;
+        transaction.commit()
+    }
+
+    /// Reads everything that a request manager takes up again.
+    ///
+    /// # Errors
+    /// When the file cannot be read or makes no sense.
+    pub fn snapshot(&self) -> Result<Snapshot, StoreError> {
+        let sql = |source| self.error(source);
+        let mut statement = self.connection.prepare("SELECT * FROM requests ORDER BY id").map_err(sql)?;
+        let mut rows = statement.query([]).map_err(sql)?;
+        let mut requests = Vec::new();
+        while let Some(row) = rows.next().map_err(sql)? {
+            let (id, stored) = read_request(row).map_err(sql)?;
+            let wrong = |what| StoreError::Value { path: self.path.clone(), id, what };
+            let stored = stored.ok_or_else(|| wrong("a state or a window that makes no sense"))?;
+            requests.push(stored);
+            if requests.len() as u64 != id {
+                return Err(wrong("a number out of order"));
+            }
+        }
+        let progress = self.progress().map_err(sql)?;
+        let refused = "SELECT COUNT(*) FROM changes WHERE request = 0";
+        let rejected: i64 = self.connection.query_row(refused, [], |row| row.get(0)).map_err(sql)?;
+        Ok(Snapshot {
+            begun: progress.is_some(),
+            requests,
+            rejected: usize::try_from(rejected).unwrap_or(0),
+            progress: progress.unwrap_or_default(),
+            last_settled: self.last_settled().map_err(sql)?,
+        })
+    }
+
+    fn last_settled(&self) -> rusqlite::Result<Option<(u64, f64)>> {
+        let select = "SELECT task, reward FROM attempts ORDER BY task DESC LIMIT 1";
+        let read = |row: &Row<'_>| Ok((row.get::<_, i64>(0)?.cast_unsigned(), row.get(1)?));
+        self.connection.query_row(select, [], read).optional()
+    }
+
+    fn progress(&self) -> rusqlite::Result<Option<Progress>> {
+        let select = "SELECT now, settled, task, request, start, t_pre, t_acq FROM progress";
+        let read = |row: &Row<'_>| {
+            let task: Option<i64> = row.get(2)?;
+            let in_flight = match task {
+                None => None,
+                Some(task) => Some(InFlight {
+                    task: task.cast_unsigned(),
+                    id: StripId(row.get::<_, i64>(3)?.cast_unsigned()),
+                    start: tick(row, 4)?,
+                    t_pre: row.get(5)?,
+                    t_acq: row.get(6)?,
+                }),
+            };
+            Ok(Progress { now: tick(row, 0)?, settled: row.get::<_, i64>(1)?.cast_unsigned(), in_flight })
+        };
+        self.connection.query_row(select, [], read).optional()
+    }
+
+    /// The history of a request, after that of the requests that it replaces.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn history(&self, id: StripId) -> Result<Vec<HistoryLine>, StoreError> {
+        let select = "WITH RECURSIVE chain (id) AS (
+                SELECT ?1 UNION SELECT requests.supersedes FROM requests JOIN chain USING (id)
+                WHERE requests.supersedes IS NOT NULL)
+            SELECT sequence, request, COALESCE(requests.client_ref, refused_ref), COALESCE(requests.name, refused_name),
+                changes.tick, changes.state, changes.reason_code, changes.reason, changes.actor
+            FROM changes JOIN chain ON changes.request = chain.id
+            LEFT JOIN requests ON requests.id = changes.request ORDER BY sequence";
+        self.lines(select, &[&id.0.cast_signed()])
+    }
+
+    /// Changes of the audit trail after a number, at most `limit`.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn trail(&self, after: u64, limit: usize) -> Result<Vec<HistoryLine>, StoreError> {
+        let select = "SELECT sequence, request, COALESCE(requests.client_ref, refused_ref),
+                COALESCE(requests.name, refused_name), changes.tick, changes.state, changes.reason_code, changes.reason,
+                changes.actor
+            FROM changes LEFT JOIN requests ON requests.id = changes.request
+            WHERE sequence > ?1 ORDER BY sequence LIMIT ?2";
+        self.lines(select, &[&after.cast_signed(), &(limit as i64)])
+    }
+
+    fn lines(&self, select: &str, values: &[&dyn rusqlite::ToSql]) -> Result<Vec<HistoryLine>, StoreError> {
+        let sql = |source| self.error(source);
+        let mut statement = self.connection.prepare_cached(select).map_err(sql)?;
+        let lines = statement.query_map(values, |row| {
+            Ok(HistoryLine {
+                sequence: row.get::<_, i64>(0)?.cast_unsigned(),
+                id: StripId(row.get::<_, i64>(1)?.cast_unsigned()),
+                client_ref: row.get(2)?,
+                name: row.get(3)?,
+                tick: tick(row, 4)?,
+                state: State::from_number(row.get(5)?).unwrap_or(State::Received),
+                reason: (row.get(6)?, row.get(7)?),
+                actor: row.get(8)?,
+            })
+        });
+        lines.map_err(sql)?.collect::<Result<_, _>>().map_err(sql)
+    }
+
+    /// The attempts at a request, in order.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn attempts(&self, id: StripId) -> Result<Vec<Attempt>, StoreError> {
+        let sql = |source| self.error(source);
+        let select = "SELECT task, start, finish, t_pre, t_acq, outcome, max_attitude_error, min_elevation, reward
+            FROM attempts WHERE request = ?1 ORDER BY task";
+        let mut statement = self.connection.prepare_cached(select).map_err(sql)?;
+        let attempts = statement.query_map([id.0.cast_signed()], |row| {
+            Ok(Attempt {
+                id,
+                task: row.get::<_, i64>(0)?.cast_unsigned(),
+                start: tick(row, 1)?,
+                end: tick(row, 2)?,
+                t_pre: row.get(3)?,
+                t_acq: row.get(4)?,
+                outcome: outcome(row.get(5)?),
+                max_attitude_error: row.get(6)?,
+                min_elevation: row.get(7)?,
+                reward: row.get(8)?,
+            })
+        });
+        attempts.map_err(sql)?.collect::<Result<_, _>>().map_err(sql)
+    }
+}
+
+/// Outcomes in the store: 0 for a success, 1 for cancelled, else the reason code of the failure.
+fn outcome_code(outcome: Outcome) -> u16 {
+    match outcome {
+        Outcome::Succeeded => 0,
+        Outcome::Cancelled => 1,
+        Outcome::Failed(failure) => failure_reason(failure).0,
+    }
+}
+
+fn outcome(code: u16) -> Outcome {
+    let failures = [FailureReason::Attitude, FailureReason::Elevation, FailureReason::Interrupted];
+    match code {
+        0 => Outcome::Succeeded,
+        1 => Outcome::Cancelled,
+        _ => Outcome::Failed(
+            failures.into_iter().find(|&it| failure_reason(it).0 == code).unwrap_or(FailureReason::Interrupted),
+        ),
+    }
+}
+
+fn tick(row: &Row<'_>, column: usize) -> rusqlite::Result<Tick> {
+    Ok(Tick(row.get::<_, i64>(column)?.cast_unsigned()))
+}
+
+fn number(id: Option<StripId>) -> Option<i64> {
+    id.map(|id| id.0.cast_signed())
+}
+
+fn insert_request(connection: &Connection, added: &Added) -> rusqlite::Result<()> {
+    let insert = "INSERT INTO requests (id, client_ref, submitter, name, start_latitude, start_longitude, end_latitude,
+            end_longitude, priority, speed, bidirectional, valid_from, valid_until, hold, max_attempts, created, linked,
+            supersedes, windows, state, reason_code, reason, actor, changed)
+        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, 0, 0, '', '', 0)";
+    let named = &added.named;
+    let request = &named.request;
+    connection.prepare_cached(insert)?.execute(params![
+        added.id.0.cast_signed(),
+        named.client_ref,
+        named.submitter,
+        named.name,
+        request.start_latitude_deg,
+        request.start_longitude_deg,
+        request.end_latitude_deg,
+        request.end_longitude_deg,
+        request.priority,
+        request.acquisition_speed_m_s,
+        request.bidirectional,
+        named.valid_from_ns.cast_signed(),
+        named.valid_until_ns.cast_signed(),
+        named.hold_for_approval,
+        named.max_attempts,
+        added.tick.0.cast_signed(),
+        number(added.linked),
+        number(added.supersedes),
+        windows_to_bytes(&added.windows),
+    ])?;
+    Ok(())
+}
+
+fn insert_change(connection: &Connection, change: &Change) -> rusqlite::Result<()> {
+    let insert = "INSERT INTO changes (request, tick, state, reason_code, reason, actor, refused_ref, refused_name)
+        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+    let refused = change.refused.as_ref();
+    connection.prepare_cached(insert)?.execute(params![
+        change.id.0.cast_signed(),
+        change.tick.0.cast_signed(),
+        change.state.number(),
+        change.reason.0,
+        change.reason.1,
+        change.actor,
+        refused.map(|named| &named.client_ref),
+        refused.map(|named| &named.name),
+    ])?;
+    if change.id.0 == 0 {
+        return Ok(());
+    }
+    let update =
+        "UPDATE requests SET state = ?2, reason_code = ?3, reason = ?4, actor = ?5, changed = ?6, attempts = ?7,
+            counted = ?8, reward = ?9, imaging = ?10, superseded_by = ?11 WHERE id = ?1";
+    let standing = &change.standing;
+    connection.prepare_cached(update)?.execute(params![
+        change.id.0.cast_signed(),
+        change.state.number(),
+        change.reason.0,
+        change.reason.1,
+        change.actor,
+        change.tick.0.cast_signed(),
+        standing.attempts,
+        standing.counted,
+        standing.reward,
+        standing.imaging.0.cast_signed(),
+        number(standing.superseded_by),
+    ])?;
+    Ok(())
+}
+
+fn insert_attempt(connection: &Connection, attempt: &Attempt) -> rusqlite::Result<()> {
+    let insert = "INSERT INTO attempts (task, request, start, finish, t_pre, t_acq, outcome, max_attitude_error,
+        min_elevation, reward) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
+    connection.prepare_cached(insert)?.execute(params![
+        attempt.task.cast_signed(),
+        attempt.id.0.cast_signed(),
+        attempt.start.0.cast_signed(),
+        attempt.end.0.cast_signed(),
+        attempt.t_pre,
+        attempt.t_acq,
+        outcome_code(attempt.outcome),
+        attempt.max_attitude_error,
+        attempt.min_elevation,
+        attempt.reward,
+    ])?;
+    Ok(())
+}
+
+fn write_progress(connection: &Connection, progress: &Progress) -> rusqlite::Result<()> {
+    let replace = "INSERT OR REPLACE INTO progress (one, now, settled, task, request, start, t_pre, t_acq)
+        VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+    let flown = progress.in_flight;
+    connection.prepare_cached(replace)?.execute(params![
+        progress.now.0.cast_signed(),
+        progress.settled.cast_signed(),
+        flown.map(|flown| flown.task.cast_signed()),
+        flown.map(|flown| flown.id.0.cast_signed()),
+        flown.map(|flown| flown.start.0.cast_signed()),
+        flown.map(|flown| flown.t_pre),
+        flown.map(|flown| flown.t_acq),
+    ])?;
+    Ok(())
+}
+
+/// A request of a row of all columns, in the order of the schema; `None` when a value makes no sense.
+fn read_request(row: &Row<'_>) -> rusqlite::Result<(u64, Option<Stored>)> {
+    let id = row.get::<_, i64>("id")?.cast_unsigned();
+    let link = |column: &str| {
+        Ok::<_, rusqlite::Error>(row.get::<_, Option<i64>>(column)?.map(|id| StripId(id.cast_unsigned())))
+    };
+    let at = |column: &str| Ok::<_, rusqlite::Error>(Tick(row.get::<_, i64>(column)?.cast_unsigned()));
+    let named = NamedRequest {
+        client_ref: row.get("client_ref")?,
+        submitter: row.get("submitter")?,
+        name: row.get("name")?,
+        request: StripRequest {
+            start_latitude_deg: row.get("start_latitude")?,
+            start_longitude_deg: row.get("start_longitude")?,
+            end_latitude_deg: row.get("end_latitude")?,
+            end_longitude_deg: row.get("end_longitude")?,
+            priority: row.get("priority")?,
+            acquisition_speed_m_s: row.get("speed")?,
+            bidirectional: row.get("bidirectional")?,
+        },
+        valid_from_ns: row.get::<_, i64>("valid_from")?.cast_unsigned(),
+        valid_until_ns: row.get::<_, i64>("valid_until")?.cast_unsigned(),
+        hold_for_approval: row.get("hold")?,
+        max_attempts: row.get("max_attempts")?,
+    };
+    let standing = Standing {
+        attempts: row.get("attempts")?,
+        counted: row.get("counted")?,
+        reward: row.get("reward")?,
+        imaging: at("imaging")?,
+        superseded_by: link("superseded_by")?,
+    };
+    let state = State::from_number(row.get("state")?);
+    let windows = windows_from_bytes(row.get_ref("windows")?.as_blob().unwrap_or_default());
+    let (Some(state), Some(windows)) = (state, windows) else { return Ok((id, None)) };
+    let request = Request {
+        named,
+        state,
+        reason: (row.get("reason_code")?, row.get("reason")?),
+        actor: row.get("actor")?,
+        created: at("created")?,
+        changed: at("changed")?,
+        standing,
+        supersedes: link("supersedes")?,
+    };
+    Ok((id, Some(Stored { request, windows, linked: link("linked")? })))
+}
+
+fn windows_to_bytes(windows: &[Window]) -> Vec<u8> {
+    windows.iter().flat_map(|window| [window.open.0.to_le_bytes(), window.close.0.to_le_bytes()]).flatten().collect()
+}
+
+fn windows_from_bytes(bytes: &[u8]) -> Option<Vec<Window>> {
+    let (pairs, rest) = bytes.as_chunks::<16>();
+    let number = |half: &[u8]| half.try_into().ok().map(u64::from_le_bytes).map(Tick);
+    let windows = pairs.iter().map(|pair| Some(Window { open: number(&pair[..8])?, close: number(&pair[8..])? }));
+    let windows = windows.collect::<Option<Vec<_>>>()?;
+    let ordered = windows.iter().all(|window| window.open <= window.close);
+    (rest.is_empty() && ordered).then_some(windows)
+}

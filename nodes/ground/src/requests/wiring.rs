@@ -1,0 +1,288 @@
+//! The request manager's topics, and what waits until it is on disk.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use swath_msgs::swath_msgs as msg;
+use swath_node::messages::{situation, task_record};
+use swath_ros::{Publisher, Spec, Subscription, graph};
+use swath_sim::time::Tick;
+use swath_sim::world::strip::StripId;
+
+use super::desk::Desk;
+use super::messages;
+use super::outgoing::Outgoing;
+use super::store::{Durability, Store};
+use super::writer::Writer;
+use swath_mission::requests::journal::{Entry, Progress};
+use swath_mission::requests::lifecycle::State;
+use swath_mission::requests::logic::{Abort, RequestLogic};
+use swath_node::node::{MissionNode, Severity};
+use swath_node::orders::{named_request, operator_action};
+
+/// Nothing happens by itself: the node only looks whether it is asked to end.
+const IDLE: Duration = Duration::from_millis(500);
+/// Requests of long calls that are taken before the mission is looked at again.
+const SLICE: usize = 100;
+
+/// Runs the request manager until it is asked to end.
+///
+/// # Errors
+/// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
+pub fn run() -> Result<()> {
+    let mut node = RequestNode::new(MissionNode::start(graph::REQUEST_MANAGER)?)?;
+    let outcome = node.fly();
+    let RequestNode { mut writer, reader, .. } = node;
+    // The last connection to close the store leaves one file.
+    drop(reader);
+    // What was taken is written, also when the node ends on an error.
+    writer.finish()?;
+    outcome
+}
+
+struct RequestNode {
+    logic: RequestLogic,
+    desk: Desk,
+    points: Subscription<msg::DecisionPoint>,
+    tasks: Subscription<msg::ImagingTask>,
+    phases: Subscription<msg::TaskPhase>,
+    requests: Subscription<msg::StripRequest>,
+    upcoming: Publisher<msg::UpcomingStrips>,
+    events: Publisher<msg::StripStatus>,
+    results: Publisher<msg::TaskResult>,
+    /// Tasks below this number have been told of.
+    told: u64,
+    actions: Publisher<msg::OperatorAction>,
+    summary: Publisher<msg::RequestSummary>,
+    aborts: Publisher<msg::TaskAbort>,
+    last: Option<msg::UpcomingStrips>,
+    /// What goes out when the batch of its number is written.
+    outbox: VecDeque<(u64, Outgoing)>,
+    /// Changes that nobody could have heard of yet.
+    unheard: Vec<Arc<Vec<Entry>>>,
+    written: Progress,
+    writer: Writer,
+    reader: Store,
+    base: MissionNode,
+    /// Removed when the node ends.
+    _temporary: Option<tempfile::TempDir>,
+}
+
+impl RequestNode {
+    fn new(base: MissionNode) -> Result<Self> {
+        let spec = Spec::new("store", String::new(), "Path of the store (SQLite); empty for one that does not last.");
+        let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
+        base.node.parameters().check_given()?;
+        let (path, temporary) = if path.as_os_str().is_empty() {
+            tracing::warn!("requests do not outlast this process: parameter `store` is not set");
+            let folder = tempfile::tempdir().context("cannot make a temporary store")?;
+            (folder.path().join("requests.sqlite"), Some(folder))
+        } else {
+            (path, None)
+        };
+        let mut store = Store::open(&path, &base.mission.identity())?;
+        let reader = Store::open_read_only(&path)?;
+        let logic = take_up(&base, &mut store)?;
+        Ok(Self {
+            desk: Desk::new(&base.node)?,
+            points: base.node.subscription(&graph::DECISION_POINT)?,
+            tasks: base.node.subscription(&graph::PLANNER_TASK)?,
+            phases: base.node.subscription(&graph::TASK_PHASE)?,
+            requests: base.node.subscription(&graph::STRIP_REQUEST)?,
+            upcoming: base.node.publisher(&graph::UPCOMING_STRIPS)?,
+            events: base.node.publisher(&graph::STRIP_EVENTS)?,
+            results: base.node.publisher(&graph::TASK_RESULTS)?,
+            told: 0,
+            actions: base.node.publisher(&graph::REQUEST_ACTIONS)?,
+            summary: base.node.publisher(&graph::REQUEST_SUMMARY)?,
+            aborts: base.node.publisher(&graph::TASK_ABORT)?,
+            last: None,
+            outbox: VecDeque::new(),
+            unheard: Vec::new(),
+            written: logic.progress(),
+            writer: Writer::start(store, base.node.signal().clone()),
+            reader,
+            logic,
+            base,
+            _temporary: temporary,
+        })
+    }
+
+    fn fly(&mut self) -> Result<()> {
+        while !self.base.shutdown.asked() {
+            self.turn()?;
+        }
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        let mut outgoing = Vec::new();
+        while let Some(point) = self.points.take()? {
+            let offer = self.offer(&point)?;
+            outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
+            outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
+            if point.mission_over {
+                outgoing.push(Outgoing::Summary);
+            }
+        }
+        while let Some(task) = self.tasks.take()? {
+            if let Some(flown) = messages::in_flight(&task) {
+                self.logic.on_task(flown);
+            }
+        }
+        while let Some(phase) = self.phases.take()? {
+            if phase.phase == msg::WheelTorque::PHASE_IMAGING {
+                self.logic.on_imaging(phase.task, Tick(phase.tick));
+            }
+        }
+        while let Some(request) = self.requests.take()? {
+            if let Err(refusal) = self.logic.submit(named_request(&request)) {
+                self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
+            }
+        }
+        self.desk.take(&mut self.logic, &self.base, &mut outgoing)?;
+        self.desk.work(&mut self.logic, SLICE, &mut outgoing);
+        self.hand_over(outgoing);
+        self.tell_aborts()?;
+        self.release()?;
+        self.writer.check()?;
+        let wait = if self.desk.is_busy() { Duration::ZERO } else { IDLE };
+        self.base.node.wait(wait)?;
+        Ok(())
+    }
+
+    fn offer(&mut self, point: &msg::DecisionPoint) -> Result<Option<msg::UpcomingStrips>> {
+        // The question again: the answer may have been lost.
+        if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task && !point.mission_over) {
+            return Ok(Some(last.clone()));
+        }
+        let now = Tick(point.tick);
+        if now < self.logic.now() && self.last.is_none() {
+            let known = self.logic.now();
+            bail!("store {} is of a flight that is at {known}, this one is at {now}", self.reader.path().display());
+        }
+        self.base.set_now(now);
+        let results = point.result.iter().chain(&point.last_imaging).map(task_record);
+        let results = match results.collect::<Result<Vec<_>, _>>() {
+            Ok(results) => results,
+            Err(error) => {
+                self.base.alarm(Severity::Error, "task result refused", &error.to_string())?;
+                return Ok(None);
+            }
+        };
+        match situation(point) {
+            Ok(situation) => self.logic.set_situation(situation),
+            Err(error) => self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?,
+        }
+        let offer = self.logic.on_decision_point(point.task, now, &results);
+        let logic = &self.logic;
+        let named = |id: StripId| logic.request(id).map(|request| &request.named);
+        let message = messages::upcoming_strips(&self.base.stamper, &offer, |candidate| named(candidate.id));
+        self.last = Some(message.clone());
+        Ok((!point.mission_over).then_some(message))
+    }
+
+    /// The tasks that nobody was told of yet, with their rewards.
+    fn results(&mut self, point: &msg::DecisionPoint) -> Vec<msg::TaskResult> {
+        let told = self.told;
+        let ended = point.last_imaging.iter().chain(&point.result);
+        let mut results: Vec<_> = ended.filter(|result| result.task >= told).cloned().collect();
+        results.dedup_by_key(|result| result.task);
+        for result in &mut results {
+            result.reward = self.logic.reward_of(result.task);
+            self.told = self.told.max(result.task + 1);
+        }
+        results
+    }
+
+    /// Gives the journal to the writer, and lets what goes out wait for it.
+    fn hand_over(&mut self, outgoing: Vec<Outgoing>) {
+        let entries = Arc::new(self.logic.take_journal());
+        let progress = self.logic.progress();
+        if !entries.is_empty() || progress != self.written {
+            let durability = outgoing.iter().map(Outgoing::durability).max().unwrap_or(Durability::Process);
+            self.writer.write(Arc::clone(&entries), progress, durability);
+            self.written = progress;
+        }
+        let number = self.writer.given();
+        self.outbox.extend(outgoing.into_iter().map(|outgoing| (number, outgoing)));
+        if !entries.is_empty() {
+            self.outbox.push_back((number, Outgoing::News(entries)));
+        }
+    }
+
+    /// Sends what is written.
+    fn release(&mut self) -> Result<()> {
+        let written = self.writer.written();
+        while let Some((_, outgoing)) = self.outbox.pop_front_if(|(number, _)| *number <= written) {
+            match outgoing {
+                Outgoing::Offer(offer) => {
+                    self.upcoming.publish(&offer)?;
+                    for entries in std::mem::take(&mut self.unheard) {
+                        self.tell_news(&entries)?;
+                    }
+                    self.tell_summary()?;
+                }
+                Outgoing::Result(result) => self.results.publish(&result)?,
+                Outgoing::Summary => self.tell_summary()?,
+                // Before the mission begins nobody may be listening yet.
+                Outgoing::News(entries) if self.last.is_none() => self.unheard.push(entries),
+                Outgoing::News(entries) => {
+                    self.tell_news(&entries)?;
+                    self.tell_summary()?;
+                }
+                answer => self.desk.answer(answer, &self.logic, &self.base, &self.reader)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn tell_summary(&self) -> Result<()> {
+        Ok(self.summary.publish(&messages::request_summary(&self.base.stamper, &self.logic))?)
+    }
+
+    fn tell_news(&self, entries: &[Entry]) -> Result<()> {
+        for entry in entries {
+            match entry {
+                Entry::Changed(change) => {
+                    self.events.publish(&messages::change(&self.base.stamper, &self.logic, change))?;
+                }
+                Entry::Taken(action) => self.actions.publish(&operator_action(&self.base.stamper, action))?,
+                Entry::Added(_) | Entry::Attempted(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn tell_aborts(&mut self) -> Result<()> {
+        for abort in self.logic.take_aborts() {
+            let Abort { task, id } = abort;
+            let state = self.logic.state(id).map_or("unknown", State::name);
+            let reason = format!("request {} is {state}", id.0);
+            tracing::info!("task {task} should be given up: {reason}");
+            self.aborts.publish(&messages::task_abort(&self.base.stamper, self.logic.now(), abort, reason))?;
+        }
+        Ok(())
+    }
+}
+
+/// The requests as they stood, or those of the mission when it begins.
+fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
+    let snapshot = store.snapshot()?;
+    let mut logic =
+        RequestLogic::new((*base.model).clone(), &base.mission.initial(), base.horizon, base.mission.rules());
+    if snapshot.begun {
+        let (count, at) = (snapshot.requests.len(), snapshot.progress.now);
+        logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled)?;
+        tracing::info!("{count} requests are taken up from {}, at {at}", store.path().display());
+        return Ok(logic);
+    }
+    let requests = base.mission.initial_requests()?;
+    let total = requests.len();
+    let accepted = requests.into_iter().filter_map(|request| logic.submit(request).ok()).count();
+    tracing::info!("{accepted} of the {total} strips known from the start are accepted");
+    Ok(logic)
+}

@@ -1,0 +1,293 @@
+//! A mission: what is flown, for how long, for whom and by which planner.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use swath_sim::config::SimConfig;
+use swath_sim::error::SimError;
+use swath_sim::mission::horizon;
+use swath_sim::model::Model;
+use swath_sim::planner::PlannerSpec;
+use swath_sim::requests::scenario::ScenarioConfig;
+use swath_sim::rng;
+use swath_sim::time::Tick;
+use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::spacecraft::Spacecraft;
+use thiserror::Error;
+
+use crate::approval::ApprovalConfig;
+use crate::orders::geojson;
+use crate::orders::geojson::{Lengths, NamedRequest, RequestsFileError};
+use crate::requests::logic::Rules;
+use crate::requests::refusal::ATTEMPTS_MAX;
+
+/// In a paced mission, the wall-clock time that planning a task may take where ticks are shorter than that; the time lost
+/// is made up.
+pub const PACED_PATIENCE: Duration = Duration::from_millis(100);
+
+/// Why a mission cannot be flown.
+#[derive(Debug, Error)]
+pub enum MissionError {
+    /// A file cannot be read.
+    #[error("cannot read mission {path}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file is no mission.
+    #[error("{path} is not a valid mission")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: Box<toml::de::Error>,
+    },
+    /// A setting is out of range.
+    #[error("mission setting {0}")]
+    Setting(#[from] SimError),
+    /// A number is out of range.
+    #[error("mission setting {name} is {value}, outside {min} to {max}")]
+    OutOfRange {
+        /// Path of the setting.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+    /// A file of requests cannot be used.
+    #[error(transparent)]
+    Requests(#[from] RequestsFileError),
+}
+
+/// A mission file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mission {
+    /// Name for people.
+    pub name: String,
+    /// Seed of everything random: initial state, random requests, random planner.
+    pub seed: u64,
+    /// Length [orbits].
+    pub orbits: f64,
+    /// 0: as fast as the nodes can go; 1: real time; x: x times real time.
+    pub pace: f64,
+    /// Simulated time of the mission's epoch [s since 1970-01-01 UTC].
+    pub epoch_unix_s: u32,
+    /// Planner: `beam`, `beam:WIDTHxDEPTH`, `lookahead`, `lookahead:TICKS` of margin, `heuristic:SECONDS`, `random`, or
+    /// a kind of policy, such as `hop-ppo` for the shipped one and `hop-ppo:FILE` for another; see [`PlannerSpec`].
+    pub planner: PlannerSpec,
+    /// Strips known from the start, and what holds for all.
+    pub requests: MissionRequests,
+    /// What the planner may do by itself.
+    pub approval: ApprovalConfig,
+    /// Longest wait for a task in lockstep [s of wall clock]; after it the attitude is held for `hold_s`.
+    pub planning_deadline_s: f64,
+    /// How long the attitude is held when no task came in time [s of simulated time].
+    pub hold_s: f64,
+    /// Initial state; drawn from the seed when it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial: Option<InitialState>,
+    /// Physics and the planning problem.
+    pub sim: SimConfig,
+    /// How the satellite that is flown differs from what guidance and planner believe of it.
+    #[serde(skip_serializing_if = "is_exact")]
+    pub plant: PlantErrors,
+}
+
+fn is_exact(plant: &PlantErrors) -> bool {
+    *plant == PlantErrors::default()
+}
+
+/// Strips known from the start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MissionRequests {
+    /// GeoJSON files, relative to the mission file.
+    pub files: Vec<PathBuf>,
+    /// Attempts before a request fails, for requests that do not say; attempts that were cut short do not count.
+    pub max_attempts: u32,
+    /// Random strips.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub random: Option<ScenarioConfig>,
+}
+
+impl Default for MissionRequests {
+    fn default() -> Self {
+        Self { files: Vec::new(), max_attempts: 10, random: None }
+    }
+}
+
+impl Default for Mission {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            seed: 0,
+            orbits: 1.0,
+            pace: 0.0,
+            // 2026-01-01T00:00:00Z.
+            epoch_unix_s: 1_767_225_600,
+            planner: PlannerSpec::default(),
+            requests: MissionRequests::default(),
+            approval: ApprovalConfig::default(),
+            planning_deadline_s: 10.0,
+            hold_s: 10.0,
+            initial: None,
+            sim: SimConfig::default(),
+            plant: PlantErrors::default(),
+        }
+    }
+}
+
+impl Mission {
+    /// Reads a mission file; paths in it become relative to where the file lies.
+    ///
+    /// # Errors
+    /// When the file cannot be read, has unknown keys, or a setting is out of range.
+    pub fn read(path: &Path) -> Result<Self, MissionError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| MissionError::Read { path: path.to_owned(), source })?;
+        let mut mission: Self = toml::from_str(&text)
+            .map_err(|source| MissionError::Parse { path: path.to_owned(), source: Box::new(source) })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        mission.planner.resolve(&std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()));
+        for file in &mut mission.requests.files {
+            *file = folder.join(&*file);
+        }
+        mission.validate()?;
+        Ok(mission)
+    }
+
+    /// Checks every setting's range.
+    ///
+    /// # Errors
+    /// The first setting that is out of range.
+    pub fn validate(&self) -> Result<(), MissionError> {
+        for (name, value, min, max) in [
+            ("orbits", self.orbits, 0.01, 10_000.0),
+            ("pace", self.pace, 0.0, 1e6),
+            ("planning_deadline_s", self.planning_deadline_s, 0.01, 3600.0),
+            ("hold_s", self.hold_s, 0.1, 3600.0),
+            ("requests.max_attempts", f64::from(self.requests.max_attempts), 1.0, f64::from(ATTEMPTS_MAX)),
+            ("approval.deadline_s", self.approval.deadline_s, 0.1, 1e6),
+            ("approval.look_again_s", self.approval.look_again_s, 0.1, 3600.0),
+        ] {
+            if !(min..=max).contains(&value) {
+                return Err(MissionError::OutOfRange { name, value, min, max });
+            }
+        }
+        if let Some(scenario) = &self.requests.random {
+            scenario.validate()?;
+        }
+        self.plant.validate()?;
+        Ok(self.sim.validate()?)
+    }
+
+    /// The same mission with its initial state drawn, if it was left out.
+    #[must_use]
+    pub fn resolved(mut self) -> Self {
+        self.initial = Some(self.initial());
+        self
+    }
+
+    /// The initial state.
+    #[must_use]
+    pub fn initial(&self) -> InitialState {
+        self.initial.unwrap_or_else(|| InitialState::draw(&self.sim, &mut rng::stream(self.seed, rng::INITIAL_STATE)))
+    }
+
+    /// The satellite at the epoch, with its errors.
+    ///
+    /// # Errors
+    /// When what the errors make of the configuration is out of range.
+    pub fn spacecraft(&self, model: &Model) -> Result<Spacecraft, MissionError> {
+        let mut spacecraft = Spacecraft::new(model, &self.initial());
+        spacecraft.differ(model, &self.plant, self.seed)?;
+        Ok(spacecraft)
+    }
+
+    /// The constants of the physics and the planning problem.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn model(&self) -> Result<Model, MissionError> {
+        Ok(Model::new(self.sim.clone())?)
+    }
+
+    /// What the mission says of its requests.
+    #[must_use]
+    pub fn rules(&self) -> Rules {
+        Rules { epoch_ns: u64::from(self.epoch_unix_s) * 1_000_000_000, max_attempts: self.requests.max_attempts }
+    }
+
+    /// What the requests of a mission rest on, as a text that differs when two missions differ in it: the satellite,
+    /// its orbit, the length and the limits. The pace and the planner may change.
+    #[must_use]
+    pub fn identity(&self) -> String {
+        let identity = (self.seed, self.orbits.to_bits(), self.epoch_unix_s, self.initial(), &self.sim);
+        serde_json::to_string(&identity).unwrap_or_default()
+    }
+
+    /// Tick at which the mission ends.
+    #[must_use]
+    pub fn horizon(&self, model: &Model) -> Tick {
+        horizon(model, self.orbits)
+    }
+
+    /// The strips known from the start: those of the files, in order, then the random ones.
+    ///
+    /// # Errors
+    /// When a file cannot be used.
+    pub fn initial_requests(&self) -> Result<Vec<NamedRequest>, MissionError> {
+        let mut requests = Vec::new();
+        for file in &self.requests.files {
+            requests.extend(geojson::read(file, Lengths::of(&self.sim))?);
+        }
+        if let Some(scenario) = &self.requests.random {
+            let mut rng = rng::stream(self.seed, rng::CATALOGUE);
+            let count = scenario.draw_count(&mut rng);
+            let random = scenario.generate(&mut rng, count, self.sim.earth.radius_m);
+            requests.extend((1..).zip(random).map(|(number, request)| {
+                NamedRequest::new(format!("random-{number}"), format!("random {number}"), request)
+            }));
+        }
+        Ok(requests)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Mission, String> {
+        let mission: Mission = toml::from_str(text).map_err(|error| error.to_string())?;
+        mission.validate().map_err(|error| error.to_string())?;
+        Ok(mission)
+    }
+
+    #[test]
+    fn a_mission_survives_its_own_text() {
+        let mission = Mission { seed: 7, ..Mission::default() }.resolved();
+        assert_eq!(parse(&toml::to_string(&mission).unwrap()), Ok(mission));
+    }
+
+    #[test]
+    fn faults_name_the_setting_and_the_limit() {
+        let error = parse("orbit = 3").unwrap_err();
+        assert!(error.contains("unknown field `orbit`"), "{error}");
+        let error = parse("pace = nan").unwrap_err();
+        assert_eq!(error, "mission setting pace is NaN, outside 0 to 1000000");
+        let error = parse("[sim.imaging]\nsigma_max = -1").unwrap_err();
+        assert_eq!(error, "mission setting imaging.sigma_max is -1, outside 0.000001 to 1");
+        let error = parse("planner = \"heuristic:-5\"").unwrap_err();
+        assert!(error.contains("-5"), "{error}");
+        let error = parse("[requests.random]\ncount = [5, 2]").unwrap_err();
+        assert_eq!(error, "mission setting scenario.count runs from 5 down to 2");
+    }
+}

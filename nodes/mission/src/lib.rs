@@ -1,0 +1,13 @@
+//! What a mission is, without ROS: its file, orders, the life cycle of requests, approval, planners that are guarded,
+//! and whole missions in one process.
+#![expect(non_snake_case, reason = "frame letters")]
+
+pub mod approval;
+pub mod file;
+pub mod guarded;
+pub mod in_process;
+pub mod orders;
+pub mod outcome;
+pub mod requests;
+pub mod task_log;
+pub mod time_text;

@@ -1,0 +1,183 @@
+//! What a mission leaves behind beside its bag: a line a task, and a summary.
+
+use serde::{Deserialize, Serialize};
+use swath_sim::task::{FailureReason, SettledTask, Totals};
+use swath_sim::time::TickPeriod;
+
+/// One line of `tasks.jsonl`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TaskLine {
+    /// Number of the task, from 0.
+    pub task: u64,
+    /// Tick at which it began.
+    pub start_tick: u64,
+    /// Tick at which it ended.
+    pub end_tick: u64,
+    /// Number of the strip; absent for a wait.
+    pub strip: Option<u64>,
+    /// Name of the strip; absent for a wait.
+    pub name: Option<String>,
+    /// Transition time T_pre [ticks].
+    pub t_pre_ticks: u32,
+    /// Acquisition time T_acq [ticks].
+    pub t_acq_ticks: u32,
+    /// Whether the strip was imaged.
+    pub success: bool,
+    /// Why not.
+    pub reason: Option<FailureReason>,
+    /// Largest ‖σ_BR‖ while imaging.
+    pub max_attitude_error: f64,
+    /// Least elevation while imaging [deg].
+    pub min_elevation_deg: f64,
+    /// Reward earned.
+    pub reward: f64,
+}
+
+impl TaskLine {
+    /// The line of a task; `name` is its strip's.
+    #[must_use]
+    pub fn new(settled: &SettledTask, name: Option<&str>) -> Self {
+        let record = &settled.record;
+        Self {
+            task: record.task,
+            start_tick: record.start.0,
+            end_tick: record.end.0,
+            strip: record.strip.map(|id| id.0),
+            name: name.map(str::to_owned),
+            t_pre_ticks: record.t_pre,
+            t_acq_ticks: record.t_acq,
+            success: record.success(),
+            reason: record.strip.and(record.outcome.failure),
+            max_attitude_error: record.outcome.max_attitude_error,
+            min_elevation_deg: record.outcome.min_elevation.to_degrees(),
+            reward: settled.reward,
+        }
+    }
+}
+
+/// A process of the mission.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NodeProcess {
+    /// Name of the node.
+    pub name: String,
+    /// Its process.
+    pub pid: u32,
+}
+
+/// `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Planner's name.
+    pub planner: String,
+    /// Seed of the mission.
+    pub seed: u64,
+    /// Length [orbits].
+    pub orbits: f64,
+    /// Simulated time flown [s].
+    pub sim_seconds: f64,
+    /// Wall-clock time from the first state to the last [s].
+    pub wall_seconds: f64,
+    /// Ratio of the two.
+    pub real_time_factor: f64,
+    /// Strips asked for at the start.
+    pub requests: u64,
+    /// Strips accepted, those submitted in flight included; a bidirectional one counts twice.
+    pub accepted: u64,
+    /// Imaging tasks flown to their end.
+    pub attempts: u64,
+    /// Strips imaged.
+    pub fulfilled: u64,
+    /// Share of the attempts that succeeded; absent without attempts.
+    pub success_rate: Option<f64>,
+    /// Sum of the priorities of the strips imaged.
+    pub reward: f64,
+    /// The same per orbit.
+    pub reward_per_orbit: f64,
+    /// Mean transition time of the attempts [s]; absent without attempts.
+    pub mean_t_pre_s: Option<f64>,
+    /// Mean acquisition time of the attempts [s]; absent without attempts.
+    pub mean_t_acq_s: Option<f64>,
+    /// Time spent waiting [s].
+    pub wait_s: f64,
+    /// Messages in the bag; 0 without one.
+    pub messages_recorded: u64,
+    /// Processes that flew the mission.
+    pub nodes: Vec<NodeProcess>,
+}
+
+/// What a summary takes from outside the totals.
+#[derive(Clone, Debug, Default)]
+pub struct SummaryInputs {
+    /// Planner's name.
+    pub planner: String,
+    /// Seed of the mission.
+    pub seed: u64,
+    /// Length [orbits].
+    pub orbits: f64,
+    /// Ticks flown.
+    pub ticks: u64,
+    /// Wall-clock time [s].
+    pub wall_seconds: f64,
+    /// Strips asked for at the start.
+    pub requests: u64,
+    /// Strips accepted.
+    pub accepted: u64,
+    /// Messages in the bag.
+    pub messages_recorded: u64,
+    /// Processes.
+    pub nodes: Vec<NodeProcess>,
+}
+
+impl Summary {
+    /// The summary of a mission.
+    #[must_use]
+    pub fn new(inputs: SummaryInputs, totals: &Totals, period: TickPeriod) -> Self {
+        let seconds = |ticks: u64| ticks as f64 * period.seconds();
+        let of_attempts = |value: f64| (totals.attempts > 0).then(|| value / totals.attempts as f64);
+        let sim_seconds = seconds(inputs.ticks);
+        Self {
+            planner: inputs.planner,
+            seed: inputs.seed,
+            orbits: inputs.orbits,
+            sim_seconds,
+            wall_seconds: inputs.wall_seconds,
+            real_time_factor: sim_seconds / inputs.wall_seconds.max(1e-9),
+            requests: inputs.requests,
+            accepted: inputs.accepted,
+            attempts: totals.attempts,
+            fulfilled: totals.fulfilled,
+            success_rate: of_attempts(totals.fulfilled as f64),
+            reward: totals.reward,
+            reward_per_orbit: totals.reward / inputs.orbits,
+            mean_t_pre_s: of_attempts(seconds(totals.t_pre_ticks)),
+            mean_t_acq_s: of_attempts(seconds(totals.t_acq_ticks)),
+            wait_s: seconds(totals.wait_ticks),
+            messages_recorded: inputs.messages_recorded,
+            nodes: inputs.nodes,
+        }
+    }
+
+    /// The summary as a table for people.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mean = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} s"));
+        let rows = [
+            ("planner", self.planner.clone()),
+            ("seed", self.seed.to_string()),
+            ("orbits", self.orbits.to_string()),
+            ("simulated time", format!("{:.0} s", self.sim_seconds)),
+            ("wall-clock time", format!("{:.2} s ({:.0} x real time)", self.wall_seconds, self.real_time_factor)),
+            ("strips requested", format!("{}, {} accepted", self.requests, self.accepted)),
+            ("attempts", self.attempts.to_string()),
+            ("strips imaged", self.fulfilled.to_string()),
+            ("success rate", self.success_rate.map_or("-".to_owned(), |rate| format!("{:.1} %", rate * 100.0))),
+            ("reward", format!("{:.2} ({:.2} per orbit)", self.reward, self.reward_per_orbit)),
+            ("mean transition", mean(self.mean_t_pre_s)),
+            ("mean acquisition", mean(self.mean_t_acq_s)),
+            ("waited", format!("{:.0} s", self.wait_s)),
+            ("messages recorded", self.messages_recorded.to_string()),
+        ];
+        let lines = rows.iter().map(|(name, value)| format!("  {name:<20} {value}\n"));
+        lines.collect()
+    }
+}

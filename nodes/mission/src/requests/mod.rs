@@ -1,0 +1,13 @@
+//! Strip requests without ROS and without a store: their life cycle, their logic, and every reason to refuse one.
+
+pub mod index;
+mod intake;
+pub mod journal;
+pub mod lifecycle;
+pub mod logic;
+pub mod query;
+pub mod refusal;
+mod settle;
+
+#[cfg(test)]
+mod tests;

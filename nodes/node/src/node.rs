@@ -1,0 +1,129 @@
+//! What every node of a mission starts with: its ROS node, its mission, its alarms.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, bail};
+use clap::Parser;
+use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
+use swath_sim::model::Model;
+use swath_sim::time::Tick;
+
+use crate::stamp::Stamper;
+use swath_mission::file::Mission;
+
+/// Own words of a node's command line; everything else is a ROS parameter.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    about = "Nodes, launcher and operator command line of Swath",
+    after_help = "Example: swath-guidance --ros-args -p mission:=out/mission.toml"
+)]
+struct NodeArgs {}
+
+/// A started node and the mission that it flies.
+pub struct MissionNode {
+    /// The ROS node.
+    pub node: Node,
+    /// Ctrl-C and SIGTERM.
+    pub shutdown: Shutdown,
+    /// The mission.
+    pub mission: Mission,
+    /// Its constants.
+    pub model: Arc<Model>,
+    /// Tick at which it ends.
+    pub horizon: Tick,
+    /// Stamps of its ticks.
+    pub stamper: Stamper,
+    diagnostics: Publisher<DiagnosticArray>,
+}
+
+/// How grave an alarm is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// Worth knowing.
+    Warn,
+    /// Something did not work.
+    Error,
+}
+
+impl MissionNode {
+    /// Starts the node `name` with the mission that its parameter `mission` names.
+    ///
+    /// # Errors
+    /// When the command line or the mission is not valid, or the node cannot come up.
+    pub fn start(name: &'static str) -> Result<Self> {
+        let (own, args) = RosArgs::split(std::env::args())?;
+        NodeArgs::parse_from(own);
+        Self::start_with(name, &args)
+    }
+
+    fn start_with(name: &'static str, args: &RosArgs) -> Result<Self> {
+        let node = Node::start(name, args)?;
+        let shutdown = Shutdown::on_signals(node.signal())?;
+        let spec = Spec::new("mission", String::new(), "Path of the mission file (TOML).").read_only();
+        let path = PathBuf::from(node.parameters().declare(spec)?);
+        if path.as_os_str().is_empty() {
+            bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
+        }
+        let mission = Mission::read(&path)?;
+        let model = Arc::new(mission.model()?);
+        let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
+        Ok(Self {
+            shutdown,
+            horizon: mission.horizon(&model),
+            stamper: Stamper::new(mission.epoch_unix_s, model.period),
+            model,
+            mission,
+            diagnostics,
+            node,
+        })
+    }
+
+    /// Sets this node's idea of simulated time.
+    pub fn set_now(&self, now: Tick) {
+        self.node.clock().set_ns(self.stamper.nanoseconds(now));
+    }
+
+    /// Raises an alarm: on `/diagnostics`, and as a log line.
+    ///
+    /// # Errors
+    /// When it cannot be sent.
+    pub fn alarm(&self, severity: Severity, name: &str, text: &str) -> Result<()> {
+        let level = match severity {
+            Severity::Warn => {
+                tracing::warn!("{name}: {text}");
+                DiagnosticStatus::WARN
+            }
+            Severity::Error => {
+                tracing::error!("{name}: {text}");
+                DiagnosticStatus::ERROR
+            }
+        };
+        let status = DiagnosticStatus {
+            level,
+            name: format!("{}: {name}", self.node.names().fully_qualified()),
+            message: text.to_owned(),
+            hardware_id: "swath".to_owned(),
+            ..DiagnosticStatus::default()
+        };
+        let mut array = DiagnosticArray::default();
+        array.header.stamp = self.node.clock().stamp();
+        array.status.push(status);
+        self.diagnostics.publish(&array).context("cannot raise an alarm")
+    }
+}
+
+/// Runs a node's body and turns its outcome into an exit code, told on stderr.
+#[must_use]
+pub fn exit_code(outcome: Result<()>) -> std::process::ExitCode {
+    match outcome {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(error) => {
+            tracing::error!("{error:#}");
+            eprintln!("error: {error:#}");
+            std::process::ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Guidance's messages.
+
+use swath_msgs::swath_msgs as msg;
+use swath_node::messages::{MessageError, acquisition, spacecraft_state, vector3};
+use swath_node::stamp::{BODY_FRAME, Stamper};
+use swath_sim::model::Model;
+use swath_sim::task::{FailureReason, Task};
+use swath_sim::world::strip::StripId;
+
+use super::logic::{Command, DecisionPoint, FinishedTask, TaskOrder};
+
+/// A task as guidance takes it.
+///
+/// # Errors
+/// When its kind is unknown or its strip cannot be flown.
+pub fn task_order(model: &Model, message: &msg::ImagingTask) -> Result<TaskOrder, MessageError> {
+    let (kind, name) = match message.kind {
+        msg::ImagingTask::KIND_IMAGE => {
+            let strip = acquisition(model, &message.strip, message.t_acq_ticks)?;
+            let (id, t_pre, t_acq) = (StripId(message.strip.id), message.t_pre_ticks, message.t_acq_ticks);
+            (Task::Image { id, strip, t_pre, t_acq }, message.strip.name.clone())
+        }
+        msg::ImagingTask::KIND_WAIT => (Task::Wait { ticks: message.wait_ticks }, String::new()),
+        value => return Err(MessageError::Constant { field: "kind", value }),
+    };
+    Ok(TaskOrder { task: message.task, kind, name })
+}
+
+/// A torque command with the tracking error that it rests on.
+#[must_use]
+pub fn wheel_torque(stamper: &Stamper, command: &Command) -> msg::WheelTorque {
+    let guidance = &command.guidance;
+    msg::WheelTorque {
+        header: stamper.header(command.tick, BODY_FRAME),
+        tick: command.tick.0,
+        torque: guidance.torque.into(),
+        task: command.task,
+        phase: phase(command),
+        sigma_br: guidance.error.sigma_BR.into(),
+        omega_br_b: vector3(&guidance.error.omega_BR_B),
+        attitude_error: guidance.error.sigma_BR.norm(),
+        elevation: guidance.elevation(),
+    }
+}
+
+/// What guidance is doing; `strip` is the number and name of the strip in hand.
+#[must_use]
+pub fn guidance_status(stamper: &Stamper, command: &Command, strip: Option<(u64, &str)>) -> msg::GuidanceStatus {
+    let (strip_id, strip_name) = strip.unwrap_or_default();
+    msg::GuidanceStatus {
+        header: stamper.header(command.tick, BODY_FRAME),
+        tick: command.tick.0,
+        task: command.task,
+        phase: phase(command),
+        strip_id,
+        strip_name: strip_name.to_owned(),
+        attitude_error: command.guidance.error.sigma_BR.norm(),
+        elevation: command.guidance.elevation(),
+        remaining_ticks: command.remaining,
+    }
+}
+
+/// A task is wanted.
+#[must_use]
+pub fn decision_point(stamper: &Stamper, point: &DecisionPoint) -> msg::DecisionPoint {
+    let state = spacecraft_state(stamper, &point.state);
+    msg::DecisionPoint {
+        header: state.header.clone(),
+        tick: point.state.tick.0,
+        task: point.task,
+        state,
+        servo_integral: point.situation.servo_integral.into(),
+        torque_pending: point.situation.torque_pending.into(),
+        mission_over: point.mission_over,
+        result: point.finished.as_ref().map(task_result).into_iter().collect::<Vec<_>>(),
+        last_imaging: point.last_imaging.as_ref().map(task_result).into_iter().collect::<Vec<_>>(),
+    }
+}
+
+/// How a task went.
+#[must_use]
+pub fn task_result(finished: &FinishedTask) -> msg::TaskResult {
+    let record = &finished.record;
+    msg::TaskResult {
+        task: record.task,
+        start_tick: record.start.0,
+        end_tick: record.end.0,
+        kind: if record.strip.is_some() { msg::ImagingTask::KIND_IMAGE } else { msg::ImagingTask::KIND_WAIT },
+        strip_id: record.strip.map_or(0, |id| id.0),
+        strip_name: finished.name.clone(),
+        t_pre_ticks: record.t_pre,
+        t_acq_ticks: record.t_acq,
+        success: record.success(),
+        reason: match record.outcome.failure {
+            None => msg::TaskResult::REASON_NONE,
+            Some(FailureReason::Attitude) => msg::TaskResult::REASON_ATTITUDE,
+            Some(FailureReason::Elevation) => msg::TaskResult::REASON_ELEVATION,
+            Some(FailureReason::Interrupted) => msg::TaskResult::REASON_INTERRUPTED,
+        },
+        max_attitude_error: record.outcome.max_attitude_error,
+        min_elevation: record.outcome.min_elevation,
+        // Whoever keeps the requests settles it.
+        reward: 0.0,
+    }
+}
+
+/// The task in hand enters a phase.
+#[must_use]
+pub fn task_phase(stamper: &Stamper, command: &Command, strip: u64) -> msg::TaskPhase {
+    msg::TaskPhase {
+        header: stamper.header(command.tick, BODY_FRAME),
+        tick: command.tick.0,
+        task: command.task,
+        strip_id: strip,
+        phase: phase(command),
+    }
+}
+
+fn phase(command: &Command) -> u8 {
+    match (command.has_strip, command.guidance.imaging) {
+        (false, _) => msg::WheelTorque::PHASE_HOLD,
+        (true, false) => msg::WheelTorque::PHASE_TRANSITION,
+        (true, true) => msg::WheelTorque::PHASE_IMAGING,
+    }
+}

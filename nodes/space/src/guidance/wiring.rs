@@ -1,0 +1,213 @@
+//! The guidance node's topics, deadlines and alarms.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use swath_msgs::swath_msgs as msg;
+use swath_node::messages::state_sample;
+use swath_ros::{Publisher, Spec, Subscription, graph};
+
+use swath_sim::time::Tick;
+use swath_sim::vehicle::dynamics::BodyState;
+use swath_sim::vehicle::spacecraft::StateSample;
+
+use super::logic::{Command, Effect, GuidanceLogic};
+use super::messages;
+use swath_mission::file::PACED_PATIENCE;
+use swath_node::node::{MissionNode, Severity};
+
+/// How long a question without an answer waits before it is asked again.
+const ASK_AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// Share of a tick's wall-clock time that planning may take in a paced mission.
+const PACED_SHARE: f64 = 0.8;
+/// Simulated time between two status messages [s].
+const STATUS_PERIOD_S: f64 = 10.0;
+
+/// Runs the guidance node until it is asked to end.
+///
+/// # Errors
+/// When the node cannot come up or DDS fails.
+pub fn run() -> Result<()> {
+    let mut node = GuidanceNode::new(MissionNode::start(graph::GUIDANCE)?)?;
+    while !node.base.shutdown.asked() {
+        node.turn()?;
+    }
+    Ok(())
+}
+
+struct GuidanceNode {
+    logic: GuidanceLogic,
+    states: Subscription<msg::SpacecraftState>,
+    /// There is one where the sensors are not exact.
+    truths: Option<Subscription<msg::SpacecraftState>>,
+    /// States that wait for the truth of their tick, and truths that wait for their states.
+    unpaired: (VecDeque<StateSample>, BTreeMap<Tick, BodyState>),
+    tasks: Subscription<msg::ImagingTask>,
+    torques: Publisher<msg::WheelTorque>,
+    points: Publisher<msg::DecisionPoint>,
+    status: Publisher<msg::GuidanceStatus>,
+    phases: Publisher<msg::TaskPhase>,
+    aborts: Subscription<msg::TaskAbort>,
+    /// Task and whether it images, as they were told last.
+    phase_told: Option<(u64, bool)>,
+    status_every: u64,
+    deadline: Duration,
+    question: Option<Question>,
+    base: MissionNode,
+}
+
+/// A task that is wanted.
+struct Question {
+    message: msg::DecisionPoint,
+    asked: Instant,
+    last_asked: Instant,
+}
+
+impl GuidanceNode {
+    fn new(base: MissionNode) -> Result<Self> {
+        let mission = &base.mission;
+        let pace = Spec::new("pace", mission.pace, "0: lockstep; 1: real time; x: x times real time.");
+        let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
+        base.node.parameters().check_given()?;
+        let period = base.model.period;
+        let seconds = if pace > 0.0 {
+            (PACED_SHARE * period.seconds() / pace).max(PACED_PATIENCE.as_secs_f64())
+        } else {
+            mission.planning_deadline_s
+        };
+        let hold = period.ticks_ceil(mission.hold_s);
+        let delay = period.ticks_ceil(mission.plant.planning_delay_s);
+        Ok(Self {
+            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold).with_planning_delay(delay),
+            states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
+            truths: match mission.plant.noisy() {
+                true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
+                false => None,
+            },
+            unpaired: Default::default(),
+            tasks: base.node.subscription(&graph::PLANNER_TASK)?,
+            torques: base.node.publisher(&graph::WHEEL_TORQUE)?,
+            points: base.node.publisher(&graph::DECISION_POINT)?,
+            status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
+            phases: base.node.publisher(&graph::TASK_PHASE)?,
+            aborts: base.node.subscription(&graph::TASK_ABORT)?,
+            phase_told: None,
+            status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
+            deadline: Duration::from_secs_f64(seconds),
+            question: None,
+            base,
+        })
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        while let Some(message) = self.aborts.take()? {
+            if self.logic.on_abort(message.task) {
+                tracing::info!("task {} is given up: {}", message.task, message.reason);
+            }
+        }
+        self.take_states()?;
+        while let Some(message) = self.tasks.take()? {
+            self.take_task(&message)?;
+        }
+        let wait = self.mind_question()?;
+        self.base.node.wait(wait)?;
+        Ok(())
+    }
+
+    fn take_states(&mut self) -> Result<()> {
+        while let Some(message) = self.truths.as_ref().map_or(Ok(None), Subscription::take)? {
+            match state_sample(&message) {
+                Ok(truth) => _ = self.unpaired.1.insert(truth.tick, truth.body),
+                Err(error) => self.base.alarm(Severity::Error, "truth refused", &error.to_string())?,
+            }
+        }
+        while let Some(message) = self.states.take()? {
+            match state_sample(&message) {
+                Ok(state) => self.unpaired.0.push_back(state),
+                Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
+            }
+        }
+        while let Some(mut state) = self.unpaired.0.pop_front() {
+            if self.truths.is_some() {
+                state.truth = self.unpaired.1.remove(&state.tick);
+                if state.truth.is_none() {
+                    self.unpaired.0.push_front(state);
+                    break;
+                }
+                self.unpaired.1.retain(|&tick, _| tick > state.tick);
+            }
+            let effects = self.logic.on_state(state);
+            self.carry_out(effects)?;
+        }
+        Ok(())
+    }
+
+    fn take_task(&mut self, message: &msg::ImagingTask) -> Result<()> {
+        // An answer given twice, or after its deadline, is nothing new.
+        if self.logic.wanted() != Some(message.task) {
+            tracing::debug!("task {} is not wanted", message.task);
+            return Ok(());
+        }
+        let order = messages::task_order(&self.base.model, message).map_err(|error| error.to_string());
+        match order.and_then(|order| self.logic.on_task(order).map_err(|error| error.to_string())) {
+            Ok(effects) => self.carry_out(effects),
+            Err(error) => self.base.alarm(Severity::Error, "task refused", &error),
+        }
+    }
+
+    /// Asks again, or holds the attitude when the answer is late; returns how long there is nothing to do.
+    fn mind_question(&mut self) -> Result<Duration> {
+        let Some(question) = &mut self.question else { return Ok(ASK_AGAIN_AFTER) };
+        if self.logic.wanted() != Some(question.message.task) {
+            self.question = None;
+            return Ok(Duration::ZERO);
+        }
+        let (task, waited) = (question.message.task, question.asked.elapsed());
+        if let Some(left) = self.deadline.checked_sub(waited) {
+            if question.last_asked.elapsed() >= ASK_AGAIN_AFTER {
+                question.last_asked = Instant::now();
+                self.points.publish(&question.message)?;
+            }
+            return Ok(left.min(ASK_AGAIN_AFTER));
+        }
+        let hold = self.base.mission.hold_s;
+        let text =
+            format!("task {task} did not come within {} s: holding attitude for {hold} s", self.deadline.as_secs_f64());
+        self.base.alarm(Severity::Warn, "planner late", &text)?;
+        let effects = self.logic.on_deadline();
+        self.carry_out(effects)?;
+        Ok(Duration::ZERO)
+    }
+
+    fn carry_out(&mut self, effects: Vec<Effect>) -> Result<()> {
+        for effect in effects {
+            match effect {
+                Effect::Command(command) => self.send(&command)?,
+                Effect::Decide(point) => {
+                    let message = messages::decision_point(&self.base.stamper, &point);
+                    self.points.publish(&message)?;
+                    let now = Instant::now();
+                    self.question = (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, command: &Command) -> Result<()> {
+        self.base.set_now(command.tick);
+        self.torques.publish(&messages::wheel_torque(&self.base.stamper, command))?;
+        let phase = (command.task, command.guidance.imaging);
+        if command.has_strip && self.phase_told != Some(phase) {
+            self.phase_told = Some(phase);
+            let strip = self.logic.strip().map_or(0, |(id, _)| id.0);
+            self.phases.publish(&messages::task_phase(&self.base.stamper, command, strip))?;
+        }
+        if command.tick.0.is_multiple_of(self.status_every) {
+            let strip = self.logic.strip().map(|(id, name)| (id.0, name));
+            self.status.publish(&messages::guidance_status(&self.base.stamper, command, strip))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,186 @@
+//! The planner node's topics and alarms.
+
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use swath_mission::orders::action::{Act, Action};
+use swath_msgs::swath_msgs as msg;
+use swath_node::messages::{situation, task_record};
+use swath_node::orders::{operator_action, planner_mode};
+use swath_ros::{Publisher, Server, Spec, Subscription, graph};
+use swath_sim::planner::{Planner, PlannerSpec};
+use swath_sim::time::Tick;
+
+use super::logic::{Planned, PlannerLogic};
+use super::messages;
+use swath_mission::approval::{Gate, GatedPlanner};
+use swath_mission::guarded::{GuardedPlanner, Policies};
+use swath_node::node::{MissionNode, Severity};
+
+/// Nothing happens by itself: the node only looks whether it is asked to end.
+const IDLE: Duration = Duration::from_millis(500);
+
+/// Runs the planner node until it is asked to end.
+///
+/// # Errors
+/// When the node cannot come up or DDS fails.
+pub fn run(policies: &Policies) -> Result<()> {
+    let mut node = PlannerNode::new(MissionNode::start(graph::PLANNER)?, policies)?;
+    while !node.base.shutdown.asked() {
+        node.turn()?;
+    }
+    Ok(())
+}
+
+struct PlannerNode {
+    logic: PlannerLogic,
+    points: Subscription<msg::DecisionPoint>,
+    upcoming: Subscription<msg::UpcomingStrips>,
+    tasks: Publisher<msg::ImagingTask>,
+    decisions: Publisher<msg::Decision>,
+    status: Publisher<msg::PlannerStatus>,
+    actions: Publisher<msg::OperatorAction>,
+    set_mode: Server<msg::SetPlannerMode>,
+    review: Server<msg::ReviewProposal>,
+    status_told: Option<msg::PlannerStatus>,
+    strips: Vec<msg::Candidate>,
+    last: Option<msg::ImagingTask>,
+    /// Alarm to raise at the first decision point: before, nobody may be listening yet.
+    missing: Option<(String, String)>,
+    now: Tick,
+    base: MissionNode,
+}
+
+impl PlannerNode {
+    fn new(base: MissionNode, policies: &Policies) -> Result<Self> {
+        let name = Spec::new("planner", base.mission.planner.to_string(), "As the mission file names planners.");
+        let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
+        base.node.parameters().check_given()?;
+        let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
+        let missing = planner
+            .missing()
+            .map(|reason| (format!("no planner {spec}"), format!("{reason}; {} takes over", planner.name())));
+        let gate = Gate::new(&base.mission.approval, base.model.period);
+        let planner = GatedPlanner { gate, planner };
+        Ok(Self {
+            logic: PlannerLogic::new((*base.model).clone(), planner),
+            status: base.node.publisher(&graph::PLANNER_STATUS)?,
+            actions: base.node.publisher(&graph::PLANNER_ACTIONS)?,
+            set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
+            review: base.node.server(&graph::REVIEW_PROPOSAL)?,
+            status_told: None,
+            points: base.node.subscription(&graph::DECISION_POINT)?,
+            upcoming: base.node.subscription(&graph::UPCOMING_STRIPS)?,
+            tasks: base.node.publisher(&graph::PLANNER_TASK)?,
+            decisions: base.node.publisher(&graph::PLANNER_DECISION)?,
+            strips: Vec::new(),
+            last: None,
+            missing,
+            now: Tick(0),
+            base,
+        })
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        while let Some(point) = self.points.take()? {
+            if point.mission_over {
+                continue;
+            }
+            if let Some((name, text)) = self.missing.take() {
+                self.base.alarm(Severity::Error, &name, &text)?;
+            }
+            // The question again: the answer may have been lost.
+            if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task) {
+                self.tasks.publish(last)?;
+                continue;
+            }
+            let started = Instant::now();
+            let previous = point.result.first().map(task_record).transpose();
+            match situation(&point).and_then(|situation| Ok((situation, previous?))) {
+                Ok((situation, previous)) => {
+                    let planned = self.logic.on_decision_point(point.task, situation, previous);
+                    self.publish(planned, started)?;
+                }
+                Err(error) => self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?,
+            }
+        }
+        while let Some(message) = self.upcoming.take()? {
+            let started = Instant::now();
+            match messages::upcoming(&self.base.model, &message) {
+                Ok(upcoming) => {
+                    self.strips = message.candidates.to_vec();
+                    let planned = self.logic.on_upcoming(upcoming);
+                    self.publish(planned, started)?;
+                }
+                Err(error) => self.base.alarm(Severity::Error, "candidates refused", &error.to_string())?,
+            }
+        }
+        self.take_orders()?;
+        self.tell_status()?;
+        self.base.node.wait(IDLE)?;
+        Ok(())
+    }
+
+    /// What operators say; it counts from the next decision on.
+    fn take_orders(&mut self) -> Result<()> {
+        let mut taken = Vec::new();
+        let (at, initial) = (self.now, self.last.is_none());
+        let mut note = |actor: String, act: Act| taken.push(Action { at, initial, actor, reason: String::new(), act });
+        let gate = self.logic.gate_mut();
+        self.set_mode.answer_all(|call| match planner_mode(call.mode) {
+            Ok(mode) => {
+                tracing::info!("{} sets the mode to {mode:?}", call.actor);
+                gate.set_mode(mode);
+                note(call.actor, Act::SetMode(mode));
+                msg::SetPlannerModeResponse { accepted: true, reason: String::new() }
+            }
+            Err(error) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
+        })?;
+        self.review.answer_all(|call| match gate.review(call.proposal, call.approve, &call.actor) {
+            Ok(proposal) => {
+                let verb = if call.approve { "approves" } else { "rejects" };
+                tracing::info!("{} {verb} proposal {proposal}", call.actor);
+                note(call.actor, Act::Decide { proposal, approve: call.approve });
+                msg::ReviewProposalResponse { accepted: true, proposal, reason: String::new() }
+            }
+            Err(error) => msg::ReviewProposalResponse { reason: error.to_string(), ..Default::default() },
+        })?;
+        for action in taken {
+            self.actions.publish(&operator_action(&self.base.stamper, &action))?;
+        }
+        Ok(())
+    }
+
+    /// Tells the mode and the proposal when they have changed.
+    fn tell_status(&mut self) -> Result<()> {
+        let proposed = self.logic.gate().proposal().map(|proposal| proposal.candidate.id.0);
+        let known = self.status_told.as_ref().map(|status| &status.strip).filter(|strip| Some(strip.id) == proposed);
+        let offered = self.strips.iter().map(|candidate| &candidate.strip);
+        // A strip that is proposed stays known when the candidates change.
+        let strip = offered.chain(known).find(|strip| Some(strip.id) == proposed).cloned().unwrap_or_default();
+        let status = messages::planner_status(&self.base.stamper, self.now, &self.logic, strip);
+        let same =
+            |told: &msg::PlannerStatus| msg::PlannerStatus { header: told.header.clone(), ..status.clone() } == *told;
+        if !self.status_told.as_ref().is_some_and(same) {
+            self.status.publish(&status)?;
+            self.status_told = Some(status);
+        }
+        Ok(())
+    }
+
+    fn publish(&mut self, planned: Option<Planned>, started: Instant) -> Result<()> {
+        let (Some(planned), Some(upcoming)) = (planned, self.logic.upcoming()) else { return Ok(()) };
+        self.now = planned.situation.now;
+        self.base.set_now(self.now);
+        if let Some(fault) = &planned.fault {
+            let text = format!("{fault}; {} takes over", planned.planner);
+            self.base.alarm(Severity::Error, "planner failed", &text)?;
+        }
+        let task = messages::imaging_task(&self.base.stamper, &planned, &self.strips);
+        self.tasks.publish(&task)?;
+        let compute_time_s = started.elapsed().as_secs_f64();
+        self.decisions.publish(&messages::decision(&self.base.stamper, &planned, upcoming, compute_time_s))?;
+        self.last = Some(task);
+        Ok(())
+    }
+}

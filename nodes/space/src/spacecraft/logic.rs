@@ -1,0 +1,149 @@
+//! The spacecraft node without ROS: it integrates what it is told, one tick after the other.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use swath_sim::time::Tick;
+use swath_sim::vehicle::spacecraft::{Spacecraft, StateSample};
+use thiserror::Error;
+
+/// Why a torque command is not taken.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum CommandError {
+    /// A torque that is NaN or infinite.
+    #[error("torque command of {tick} has a component that is not finite: {torque:?} N m")]
+    NotFinite {
+        /// Tick it was computed from.
+        tick: Tick,
+        /// The command [N m].
+        torque: [f64; 3],
+    },
+    /// A command from a state that was not sent yet.
+    #[error("torque command is of {tick}, the state sent last is of {now}")]
+    FromTheFuture {
+        /// Tick it was computed from.
+        tick: Tick,
+        /// Tick of the latest state.
+        now: Tick,
+    },
+}
+
+/// The spacecraft and the commands that it has not used yet.
+#[derive(Clone, Debug)]
+pub struct SpacecraftLogic {
+    spacecraft: Spacecraft,
+    horizon: Tick,
+    commands: BTreeMap<Tick, Vector3<f64>>,
+    /// Ticks flown without a command because none had come in time.
+    pub missed: u64,
+}
+
+impl SpacecraftLogic {
+    /// A spacecraft that stops at `horizon`.
+    #[must_use]
+    pub fn new(spacecraft: Spacecraft, horizon: Tick) -> Self {
+        Self { spacecraft, horizon, commands: BTreeMap::new(), missed: 0 }
+    }
+
+    /// Simulated time.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.spacecraft.now
+    }
+
+    /// Whether the mission's end is reached.
+    #[must_use]
+    pub fn done(&self) -> bool {
+        self.now() >= self.horizon
+    }
+
+    /// What the spacecraft tells of itself now.
+    pub fn sample(&mut self) -> StateSample {
+        self.spacecraft.sample()
+    }
+
+    /// Takes the command computed from the state at `tick`; one that came too late is left out.
+    ///
+    /// # Errors
+    /// When the command is not finite or belongs to a state that was not sent yet.
+    pub fn command(&mut self, tick: Tick, torque: Vector3<f64>) -> Result<(), CommandError> {
+        if !torque.iter().all(|component| component.is_finite()) {
+            return Err(CommandError::NotFinite { tick, torque: torque.into() });
+        }
+        let now = self.now();
+        if tick > now {
+            return Err(CommandError::FromTheFuture { tick, now });
+        }
+        if tick.after(1) >= now {
+            self.commands.insert(tick, torque);
+        }
+        Ok(())
+    }
+
+    /// Whether the command that the next tick needs has come: that of the tick before this one.
+    #[must_use]
+    pub fn ready(&self) -> bool {
+        let now = self.now();
+        now == Tick(0) || self.commands.contains_key(&Tick(now.0 - 1))
+    }
+
+    /// Integrates one tick. The wheels idle when no command has come: the first tick has none, and in a paced mission
+    /// guidance may be late.
+    pub fn advance(&mut self) -> StateSample {
+        let now = self.now();
+        let command = match now.0.checked_sub(1) {
+            Some(before) => self.commands.remove(&Tick(before)).unwrap_or_else(|| {
+                self.missed += 1;
+                Vector3::zeros()
+            }),
+            None => Vector3::zeros(),
+        };
+        self.spacecraft.advance(&command);
+        self.commands = self.commands.split_off(&now);
+        self.sample()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use swath_sim::config::SimConfig;
+    use swath_sim::model::Model;
+    use swath_sim::rng;
+    use swath_sim::vehicle::initial::InitialState;
+
+    use super::*;
+
+    fn spacecraft() -> SpacecraftLogic {
+        let model = Model::new(SimConfig::default()).unwrap();
+        let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
+        SpacecraftLogic::new(Spacecraft::new(&model, &initial), Tick(100))
+    }
+
+    #[test]
+    fn a_command_acts_one_tick_after_its_state() {
+        let mut spacecraft = spacecraft();
+        assert!(spacecraft.ready());
+        let torque = Vector3::new(0.1, -0.2, 0.3);
+        spacecraft.command(Tick(0), torque).unwrap();
+        assert_eq!(spacecraft.advance().torque_applied, Vector3::zeros());
+        assert!(spacecraft.ready());
+        assert_eq!(spacecraft.advance().torque_applied, torque);
+        assert!(!spacecraft.ready());
+        assert_eq!(spacecraft.missed, 0);
+        assert_eq!(spacecraft.advance().torque_applied, Vector3::zeros());
+        assert_eq!(spacecraft.missed, 1);
+    }
+
+    #[test]
+    fn commands_that_make_no_sense_are_refused() {
+        let mut spacecraft = spacecraft();
+        let nan = Vector3::new(f64::NAN, 0.0, 0.0);
+        assert!(matches!(spacecraft.command(Tick(0), nan), Err(CommandError::NotFinite { .. })));
+        assert!(matches!(spacecraft.command(Tick(1), Vector3::zeros()), Err(CommandError::FromTheFuture { .. })));
+        for _ in 0..5 {
+            spacecraft.advance();
+        }
+        spacecraft.command(Tick(1), Vector3::zeros()).unwrap();
+        assert!(!spacecraft.ready(), "a command that came too late is not used");
+    }
+}

@@ -1,0 +1,93 @@
+//! The spacecraft in standard messages, for ROS tools: frames, wheels, sub-satellite point.
+
+use anyhow::Result;
+use swath_msgs::geometry_msgs::{Quaternion, Transform, TransformStamped};
+use swath_msgs::sensor_msgs::{JointState, NavSatFix, NavSatStatus};
+use swath_msgs::tf2_msgs::TFMessage;
+use swath_ros::{Publisher, Spec, graph};
+use swath_sim::vehicle::mrp;
+use swath_sim::world::frames::latitude_longitude_deg;
+
+use swath_node::messages::vector3;
+use swath_node::node::MissionNode;
+use swath_node::stamp::{BODY_FRAME, EARTH_FRAME, INERTIAL_FRAME};
+use swath_sim::vehicle::spacecraft::StateSample;
+
+/// Writers of standard messages, once in a while.
+pub struct Telemetry {
+    frames: Publisher<TFMessage>,
+    wheels: Publisher<JointState>,
+    sub_satellite: Publisher<NavSatFix>,
+    every: u64,
+}
+
+impl Telemetry {
+    /// Telemetry every `telemetry_period_s` of simulated time.
+    ///
+    /// # Errors
+    /// When the parameter is out of range or DDS fails.
+    pub fn new(base: &MissionNode) -> Result<Self> {
+        let period = Spec::new("telemetry_period_s", 10.0, "Simulated time between frames, wheels and ground track.");
+        let period = base.node.parameters().declare(period.in_range(0.1..=3600.0).read_only())?;
+        Ok(Self {
+            frames: base.node.publisher(&graph::TF)?,
+            wheels: base.node.publisher(&graph::WHEELS)?,
+            sub_satellite: base.node.publisher(&graph::SUB_SATELLITE_POINT)?,
+            every: u64::from(base.model.period.ticks_ceil(period).max(1)),
+        })
+    }
+
+    /// Sends telemetry of a state when it is due.
+    ///
+    /// # Errors
+    /// When it cannot be sent.
+    pub fn publish(&self, base: &MissionNode, sample: &StateSample) -> Result<()> {
+        if !sample.tick.0.is_multiple_of(self.every) {
+            return Ok(());
+        }
+        let (cos, sin) = base.model.earth.clone().cos_sin(sample.tick);
+        self.frames.publish(&frames(base, sample, cos, sin))?;
+        self.wheels.publish(&JointState {
+            header: base.stamper.header(sample.tick, BODY_FRAME),
+            name: ["wheel_x", "wheel_y", "wheel_z"].map(str::to_owned).to_vec(),
+            velocity: sample.body.wheel_speed.as_slice().to_vec(),
+            effort: sample.torque_applied.as_slice().to_vec(),
+            ..JointState::default()
+        })?;
+        let r = sample.r_BN_N;
+        let r_E = nalgebra::Vector3::new(cos * r.x + sin * r.y, cos * r.y - sin * r.x, r.z);
+        let (latitude, longitude) = latitude_longitude_deg(&r_E);
+        let mut fix = NavSatFix {
+            header: base.stamper.header(sample.tick, EARTH_FRAME),
+            latitude,
+            longitude,
+            altitude: r.norm() - base.model.config.earth.radius_m,
+            position_covariance_type: NavSatFix::COVARIANCE_TYPE_UNKNOWN,
+            ..NavSatFix::default()
+        };
+        fix.status.status = NavSatStatus::STATUS_FIX;
+        Ok(self.sub_satellite.publish(&fix)?)
+    }
+}
+
+fn frames(base: &MissionNode, sample: &StateSample, cos: f64, sin: f64) -> TFMessage {
+    let header = base.stamper.header(sample.tick, INERTIAL_FRAME);
+    // The orientation of a child frame in its parent: dcm_NB, whose quaternion has the Euler parameters of σ_BN.
+    let [w, x, y, z] = mrp::to_euler_parameters(&sample.body.sigma_BN);
+    let body = TransformStamped {
+        header: header.clone(),
+        child_frame_id: BODY_FRAME.to_owned(),
+        transform: Transform { translation: vector3(&sample.r_BN_N), rotation: Quaternion { x, y, z, w } },
+    };
+    // Half-angle from the angle's cosine and sine.
+    let half = 0.5 * sin.atan2(cos);
+    let earth = TransformStamped {
+        header,
+        child_frame_id: EARTH_FRAME.to_owned(),
+        transform: Transform {
+            rotation: Quaternion { x: 0.0, y: 0.0, z: half.sin(), w: half.cos() },
+            ..Transform::default()
+        },
+    };
+    TFMessage { transforms: vec![body, earth] }
+}

@@ -1,0 +1,192 @@
+//! The spacecraft node's topics, pace and telemetry.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
+use swath_node::messages::spacecraft_state;
+use swath_ros::{Publisher, Spec, Subscription, graph};
+use swath_sim::time::Tick;
+
+use super::logic::SpacecraftLogic;
+use super::telemetry::Telemetry;
+use swath_mission::file::PACED_PATIENCE;
+use swath_node::node::{MissionNode, Severity};
+use swath_sim::vehicle::spacecraft::StateSample;
+
+/// In lockstep, states without an answer for so long are sent again.
+const RESEND_AFTER: Duration = Duration::from_millis(300);
+/// How long the last messages may take to reach their readers.
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
+/// In a paced mission, how long a late command is waited for where ticks are shorter than that.
+const COMMAND_PATIENCE: Duration = PACED_PATIENCE.saturating_mul(2);
+/// States that may be without an answer: two ticks are under way at once.
+const IN_FLIGHT: usize = 2;
+
+/// Runs the spacecraft node until it is asked to end.
+///
+/// # Errors
+/// When the node cannot come up, a peer is missing, or DDS fails.
+pub fn run() -> Result<()> {
+    let base = MissionNode::start(graph::SPACECRAFT)?;
+    let mut spacecraft = SpacecraftNode::new(base)?;
+    spacecraft.wait_for_peers()?;
+    spacecraft.fly()?;
+    spacecraft.linger()
+}
+
+struct SpacecraftNode {
+    logic: SpacecraftLogic,
+    clock: Publisher<Clock>,
+    states: Publisher<SpacecraftState>,
+    /// There is one where the sensors are not exact.
+    truths: Option<Publisher<SpacecraftState>>,
+    commands: Subscription<WheelTorque>,
+    telemetry: Telemetry,
+    unanswered: VecDeque<StateSample>,
+    pace: f64,
+    peers: Vec<String>,
+    peer_timeout: Duration,
+    base: MissionNode,
+}
+
+impl SpacecraftNode {
+    fn new(base: MissionNode) -> Result<Self> {
+        let parameters = base.node.parameters();
+        let pace = Spec::new("pace", base.mission.pace, "0: lockstep; 1: real time; x: x times real time.");
+        let pace = parameters.declare(pace.in_range(0.0..=1e6).read_only())?;
+        let peers = "guidance,request_manager,planner".to_owned();
+        let peers = Spec::new("wait_for", peers, "Nodes that must be there before time begins, by commas.");
+        let peers = parameters.declare(peers.read_only())?.split(',').map(str::to_owned).collect();
+        let timeout = Spec::new("peer_timeout_s", 20.0, "How long to wait for them.");
+        let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
+        parameters.check_given()?;
+        Ok(Self {
+            logic: SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon),
+            clock: base.node.publisher(&graph::CLOCK)?,
+            states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
+            truths: match base.mission.plant.noisy() {
+                true => Some(base.node.publisher(&graph::SPACECRAFT_TRUTH)?),
+                false => None,
+            },
+            commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
+            telemetry: Telemetry::new(&base)?,
+            unanswered: VecDeque::new(),
+            pace,
+            peers,
+            peer_timeout: Duration::from_secs_f64(timeout),
+            base,
+        })
+    }
+
+    fn wait_for_peers(&self) -> Result<()> {
+        let peers: Vec<&str> = self.peers.iter().map(String::as_str).filter(|peer| !peer.is_empty()).collect();
+        Ok(self.base.node.wait_for_peers(&peers, self.peer_timeout)?)
+    }
+
+    fn fly(&mut self) -> Result<()> {
+        let first = self.logic.sample();
+        self.publish(&first)?;
+        if self.pace > 0.0 {
+            self.fly_paced()?
+        } else {
+            self.fly_in_lockstep()?
+        }
+        if self.logic.missed > 0 {
+            let text = format!("{} ticks were flown without a command", self.logic.missed);
+            self.base.alarm(Severity::Warn, "late commands", &text)?;
+        }
+        Ok(())
+    }
+
+    /// As fast as the nodes can go: a tick is integrated when its command has come.
+    fn fly_in_lockstep(&mut self) -> Result<()> {
+        let mut progress = Instant::now();
+        while !self.logic.done() && !self.base.shutdown.asked() {
+            self.take_commands()?;
+            let before = self.logic.now();
+            while self.logic.ready() && !self.logic.done() {
+                let sample = self.logic.advance();
+                self.publish(&sample)?;
+            }
+            if self.logic.now() > before {
+                progress = Instant::now();
+            } else if progress.elapsed() > RESEND_AFTER {
+                self.resend()?;
+                progress = Instant::now();
+            }
+            if !self.logic.ready() {
+                self.base.node.wait(RESEND_AFTER)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// At a multiple of real time: a tick is integrated when its time has come.
+    ///
+    /// Where ticks are shorter than a decision may take, a late command is waited for, and the time lost is made up.
+    fn fly_paced(&mut self) -> Result<()> {
+        let tick = Duration::from_secs_f64(self.base.model.period.seconds() / self.pace);
+        let mut due = Instant::now() + tick;
+        let mut latest = due.max(Instant::now() + COMMAND_PATIENCE);
+        while !self.logic.done() && !self.base.shutdown.asked() {
+            self.take_commands()?;
+            let now = Instant::now();
+            let wanted = if self.logic.ready() { due } else { latest };
+            if now < wanted {
+                self.base.node.wait(wanted - now)?;
+                continue;
+            }
+            due += tick;
+            latest = due.max(now + COMMAND_PATIENCE);
+            let sample = self.logic.advance();
+            self.publish(&sample)?;
+        }
+        Ok(())
+    }
+
+    fn take_commands(&mut self) -> Result<()> {
+        while let Some(message) = self.commands.take()? {
+            if let Err(error) = self.logic.command(Tick(message.tick), message.torque.into()) {
+                self.base.alarm(Severity::Error, "command refused", &error.to_string())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn publish(&mut self, sample: &StateSample) -> Result<()> {
+        self.base.set_now(sample.tick);
+        self.clock.publish(&Clock { clock: self.base.stamper.time(sample.tick) })?;
+        self.tell(sample)?;
+        if self.unanswered.len() == IN_FLIGHT {
+            self.unanswered.pop_front();
+        }
+        self.unanswered.push_back(*sample);
+        self.telemetry.publish(&self.base, sample)
+    }
+
+    fn tell(&self, sample: &StateSample) -> Result<()> {
+        if let (Some(truths), Some(body)) = (&self.truths, sample.truth) {
+            truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
+        }
+        Ok(self.states.publish(&spacecraft_state(&self.base.stamper, sample))?)
+    }
+
+    /// A first sample can be lost to a reader that is still being matched: without this, nothing would ever move.
+    fn resend(&self) -> Result<()> {
+        self.unanswered.iter().try_for_each(|sample| self.tell(sample))
+    }
+
+    fn linger(&self) -> Result<()> {
+        self.states.flush(FLUSH_TIMEOUT);
+        self.clock.flush(FLUSH_TIMEOUT);
+        while !self.base.shutdown.asked() {
+            self.base.node.wait(FLUSH_TIMEOUT)?;
+            // The last state is the one that ends the mission: it must arrive.
+            while self.commands.take()?.is_some() {}
+        }
+        Ok(())
+    }
+}

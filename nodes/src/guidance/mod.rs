@@ -1,4 +1,0 @@
-//! The guidance node: it flies the active task.
-
-pub mod logic;
-pub mod wiring;

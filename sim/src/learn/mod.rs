@@ -1,0 +1,4 @@
+//! What a learner meets: episodes, observations, hybrid actions.
+
+pub mod episode;
+pub mod observation;

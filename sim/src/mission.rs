@@ -1,0 +1,165 @@
+//! A mission: decide, fly, settle; the one loop of episodes, of missions in one process, and of re-flights.
+
+use std::sync::Arc;
+
+use crate::model::Model;
+use crate::planner::{Decision, DecisionContext, Planner, PlannerError};
+use crate::requests::catalogue::Candidate;
+use crate::task::{SettledTask, TaskRecord};
+use crate::time::Tick;
+use crate::vehicle::flight::{Flight, Situation};
+
+/// Whoever keeps the requests of a mission.
+pub trait RequestKeeper {
+    /// A task is wanted: puts what may be imaged into `candidates`. It may be asked again for the same task.
+    fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>);
+
+    /// A task has ended: says its reward.
+    fn settle(&mut self, record: &TaskRecord) -> f64;
+}
+
+/// A satellite, whoever keeps its requests, and a clock.
+#[derive(Clone, Debug)]
+pub struct Mission<K> {
+    model: Arc<Model>,
+    flight: Flight,
+    keeper: K,
+    horizon: Tick,
+    task: u64,
+    situation: Situation,
+    previous: Option<TaskRecord>,
+    candidates: Vec<Candidate>,
+    /// Time from a situation to the start of the task decided on it [ticks].
+    planning_delay: u32,
+}
+
+impl<K: RequestKeeper> Mission<K> {
+    /// A mission that begins where a flight stands and ends at `horizon`.
+    #[must_use]
+    pub fn new(model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
+        let situation = flight.situation();
+        let (task, previous, candidates) = (0, None, Vec::new());
+        let mut mission =
+            Self { model, flight, keeper, horizon, task, situation, previous, candidates, planning_delay: 0 };
+        mission.refresh();
+        mission
+    }
+
+    /// From now on this much time passes between a situation and the start of the task decided on it [ticks].
+    pub fn set_planning_delay(&mut self, ticks: u32) {
+        self.planning_delay = ticks;
+    }
+
+    /// What the next decision rests on.
+    #[must_use]
+    pub fn context(&self) -> DecisionContext<'_> {
+        DecisionContext {
+            task: self.task,
+            situation: &self.situation,
+            candidates: &self.candidates,
+            previous: self.previous.as_ref(),
+            model: &self.model,
+        }
+    }
+
+    /// Simulated time.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.flight.now()
+    }
+
+    /// Tick at which the mission ends.
+    #[must_use]
+    pub fn horizon(&self) -> Tick {
+        self.horizon
+    }
+
+    /// Whether the mission's end is reached.
+    #[must_use]
+    pub fn over(&self) -> bool {
+        self.now() >= self.horizon
+    }
+
+    /// The constants.
+    #[must_use]
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Whoever keeps the requests.
+    #[must_use]
+    pub fn keeper(&self) -> &K {
+        &self.keeper
+    }
+
+    /// Changes something about the requests, and looks again at what may be imaged.
+    pub fn change<R>(&mut self, change: impl FnOnce(&mut K) -> R) -> R {
+        let result = change(&mut self.keeper);
+        self.refresh();
+        result
+    }
+
+    /// Changes something about the satellite, and looks again at where it stands.
+    pub(crate) fn refit<R>(&mut self, change: impl FnOnce(&mut Flight, &Model) -> R) -> R {
+        let result = change(&mut self.flight, &self.model);
+        self.refresh();
+        result
+    }
+
+    /// Flies one task, cut short at `until`.
+    ///
+    /// # Errors
+    /// When the decision is not one that the context allows; nothing is flown then.
+    pub fn fly(&mut self, decision: Decision, until: Tick) -> Result<SettledTask, PlannerError> {
+        let task = decision.to_task(&self.context())?;
+        let record = self.flight.fly_number(self.task, task, self.planning_delay, until);
+        let reward = self.keeper.settle(&record);
+        self.task += 1;
+        self.previous = Some(record.clone());
+        self.refresh();
+        Ok(SettledTask { record, reward })
+    }
+
+    /// Decides and flies one task, cut short at `until` and at the mission's end; nothing once it is over.
+    ///
+    /// # Errors
+    /// When the planner gave no usable decision.
+    pub fn fly_one(&mut self, planner: &mut dyn Planner, until: Tick) -> Result<Option<SettledTask>, PlannerError> {
+        if self.over() {
+            return Ok(None);
+        }
+        let decision = planner.decide(&self.context())?;
+        self.fly(decision, until.min(self.horizon)).map(Some)
+    }
+
+    /// Decides and flies to the mission's end, handing each task to `each`.
+    ///
+    /// # Errors
+    /// The first error of the planner.
+    pub fn run(&mut self, planner: &mut dyn Planner, mut each: impl FnMut(&SettledTask)) -> Result<(), PlannerError> {
+        while let Some(settled) = self.fly_one(planner, self.horizon)? {
+            each(&settled);
+        }
+        Ok(())
+    }
+
+    fn refresh(&mut self) {
+        self.situation = self.flight.situation();
+        self.keeper.offer(self.task, &self.situation, &mut self.candidates);
+    }
+}
+
+/// How far past the mission's end windows are sought [orbits], so that its end cannot be seen in the observation.
+const WINDOW_MARGIN_ORBITS: f64 = 1.5;
+
+/// Tick at which a mission of a number of orbits ends.
+#[must_use]
+pub fn horizon(model: &Model, orbits: f64) -> Tick {
+    Tick((orbits * model.orbit_period_s() / model.period.seconds()).round() as u64)
+}
+
+/// Tick up to which a mission that ends at `horizon` seeks windows.
+#[must_use]
+pub fn windows_until(model: &Model, horizon: Tick) -> Tick {
+    horizon.after(model.period.ticks_ceil(model.orbit_period_s() * WINDOW_MARGIN_ORBITS))
+}

@@ -1,0 +1,110 @@
+//! The task executive: it flies one task after the other by what is measured, and judges them by what is true.
+
+use nalgebra::Vector3;
+
+use crate::model::Model;
+use crate::task::{Task, TaskOutcome, TaskRecord};
+use crate::time::Tick;
+use crate::vehicle::dynamics::BodyState;
+use crate::vehicle::guidance::{Guidance, GuidanceTick};
+
+/// The satellite at a tick, as the executive is told of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<'a> {
+    /// Simulated time.
+    pub now: Tick,
+    /// Position in N [m].
+    pub r_BN_N: Vector3<f64>,
+    /// Attitude, rate and wheel speeds as they are measured.
+    pub measured: &'a BodyState,
+    /// The same as they are, where the sensors are not exact: images are judged by it.
+    pub truth: Option<&'a BodyState>,
+}
+
+/// Flies tasks.
+#[derive(Clone, Debug)]
+pub struct Executive {
+    /// The guidance law and the task in hand.
+    pub guidance: Guidance,
+    judge: Option<Box<Guidance>>,
+    active: Option<Active>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Active {
+    number: u64,
+    task: Task,
+    /// Tick at which the task itself begins; before it the attitude is held.
+    start: Tick,
+    begun: bool,
+}
+
+impl Executive {
+    /// An executive without a task.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        Self { guidance: Guidance::new(model), judge: None, active: None }
+    }
+
+    /// Takes up task `number` after `delay` ticks in which the attitude is held.
+    pub fn begin(&mut self, number: u64, task: Task, delay: u32, sight: &Sight<'_>) {
+        let start = sight.now.after(delay);
+        self.active = Some(Active { number, task, start, begun: delay == 0 });
+        self.start(if delay == 0 { task } else { Task::Wait { ticks: delay } }, sight);
+    }
+
+    fn start(&mut self, task: Task, sight: &Sight<'_>) {
+        self.guidance.start(task, sight.now, sight.measured);
+        let Some(truth) = sight.truth else { return };
+        let guidance = &self.guidance;
+        self.judge.get_or_insert_with(|| Box::new(guidance.clone())).start(task, sight.now, truth);
+    }
+
+    /// The task in hand and the tick at which it begins.
+    #[must_use]
+    pub fn task(&self) -> Option<(&Task, Tick)> {
+        self.active.as_ref().map(|active| (&active.task, active.start))
+    }
+
+    /// Number of the task in hand.
+    #[must_use]
+    pub fn number(&self) -> Option<u64> {
+        self.active.as_ref().map(|active| active.number)
+    }
+
+    /// Tick at which the task in hand ends.
+    #[must_use]
+    pub fn end(&self) -> Option<Tick> {
+        self.active.as_ref().map(|active| active.start.after(active.task.ticks()))
+    }
+
+    /// Puts the task in hand away and tells how it went; before its end it counts as interrupted. `None` without one.
+    pub fn finish(&mut self, sight: &Sight<'_>) -> Option<TaskRecord> {
+        let Active { number, task, start, begun } = self.active.take()?;
+        let (now, r_BN_N) = (sight.now, &sight.r_BN_N);
+        let seen = self.guidance.finish(now, r_BN_N, sight.measured);
+        let judged = match (&mut self.judge, sight.truth) {
+            (Some(judge), Some(truth)) => judge.finish(now, r_BN_N, truth),
+            _ => None,
+        };
+        let outcome = judged.or(seen).filter(|_| begun).unwrap_or(TaskOutcome::NOT_BEGUN);
+        Some(TaskRecord::new(number, &task, start.min(now), now, outcome))
+    }
+
+    /// One control tick: the torque command computed from what is seen now. Without a task the torque is zero.
+    #[inline]
+    pub fn tick(&mut self, sight: &Sight<'_>) -> GuidanceTick {
+        if let Some(active) = &mut self.active
+            && !active.begun
+            && sight.now >= active.start
+        {
+            active.begun = true;
+            let task = active.task;
+            self.start(task, sight);
+        }
+        if let (Some(judge), Some(truth)) = (&mut self.judge, sight.truth) {
+            judge.tick(sight.now, &sight.r_BN_N, truth);
+        }
+        self.guidance.tick(sight.now, &sight.r_BN_N, sight.measured)
+    }
+}

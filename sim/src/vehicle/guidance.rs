@@ -1,0 +1,254 @@
+//! Strip guidance (paper, eqs 1-13): reference attitude, tracking error, constraints, and the task in hand.
+
+use nalgebra::Vector3;
+
+use crate::model::Model;
+use crate::task::{FailureReason, Task, TaskOutcome};
+use crate::time::Tick;
+use crate::vehicle::control::{ControlLaw, TrackingError};
+use crate::vehicle::dynamics::{BodyState, Plant};
+use crate::vehicle::mrp;
+use crate::vehicle::mrp::EulerParameters;
+use crate::world::frames::{earth_to_inertial, reference_dcm, sin_elevation};
+use crate::world::strip::Strip;
+use crate::world::turn::Turn;
+
+/// What guidance knows and commands at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidanceTick {
+    /// Wheel torque, saturated [N m]; acts one tick later.
+    pub torque: Vector3<f64>,
+    /// Tracking error.
+    pub error: TrackingError,
+    /// Sine of the elevation of the satellite seen from the target; 1 in a wait.
+    pub sin_elevation: f64,
+    /// Whether the strip is being imaged.
+    pub imaging: bool,
+}
+
+impl GuidanceTick {
+    /// Elevation of the satellite seen from the target [rad]; π/2 in a wait.
+    #[must_use]
+    pub fn elevation(&self) -> f64 {
+        libm::asin(self.sin_elevation)
+    }
+}
+
+/// The guidance and control computer: one task at a time, one torque command a tick.
+#[derive(Clone, Debug)]
+pub struct Guidance {
+    law: ControlLaw,
+    plant: Plant,
+    limits: ImagingLimits,
+    earth: Turn,
+    earth_radius: f64,
+    dt: f64,
+    /// Rate-error integral z of the servo [rad]; persists from task to task.
+    pub servo_integral: Vector3<f64>,
+    active: Option<ActiveTask>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct ImagingLimits {
+    sigma_max: f64,
+    sin_elevation_min: f64,
+    required_fraction: f64,
+}
+
+#[derive(Clone, Debug)]
+struct ActiveTask {
+    task: Task,
+    start: Tick,
+    hold: EulerParameters,
+    previous_sigma: Option<Vector3<f64>>,
+    record: ImagingRecord,
+}
+
+/// Running evaluation of eqs 12 and 13.
+#[derive(Clone, Copy, Debug)]
+struct ImagingRecord {
+    samples: u32,
+    kept: u32,
+    elevation_broken: bool,
+    max_error_squared: f64,
+    min_sin_elevation: f64,
+}
+
+impl ImagingRecord {
+    const NEW: Self =
+        Self { samples: 0, kept: 0, elevation_broken: false, max_error_squared: 0.0, min_sin_elevation: 1.0 };
+
+    #[inline]
+    fn add(&mut self, limits: &ImagingLimits, error_squared: f64, sin_elevation: f64) {
+        let elevation_kept = sin_elevation > limits.sin_elevation_min;
+        self.samples += 1;
+        self.kept += u32::from(elevation_kept && error_squared < limits.sigma_max * limits.sigma_max);
+        self.elevation_broken |= !elevation_kept;
+        self.max_error_squared = self.max_error_squared.max(error_squared);
+        self.min_sin_elevation = self.min_sin_elevation.min(sin_elevation);
+    }
+
+    fn outcome(&self, limits: &ImagingLimits, interrupted: bool) -> TaskOutcome {
+        let enough = f64::from(self.kept) >= limits.required_fraction * f64::from(self.samples);
+        let failure = if interrupted {
+            Some(FailureReason::Interrupted)
+        } else if enough {
+            None
+        } else if self.elevation_broken {
+            // No attitude could have helped.
+            Some(FailureReason::Elevation)
+        } else {
+            Some(FailureReason::Attitude)
+        };
+        TaskOutcome {
+            failure,
+            max_attitude_error: self.max_error_squared.sqrt(),
+            min_elevation: libm::asin(self.min_sin_elevation),
+        }
+    }
+}
+
+impl Guidance {
+    /// A guidance computer with an empty servo integral and no task.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        let config = &model.config;
+        Self {
+            law: model.law.clone(),
+            plant: model.plant.clone(),
+            limits: ImagingLimits {
+                sigma_max: config.imaging.sigma_max,
+                sin_elevation_min: libm::sin(config.imaging.elevation_min_deg.to_radians()),
+                required_fraction: config.imaging.required_fraction,
+            },
+            earth: model.earth.clone(),
+            earth_radius: config.earth.radius_m,
+            dt: model.period.seconds(),
+            servo_integral: Vector3::zeros(),
+            active: None,
+        }
+    }
+
+    /// Takes up a task at tick `start`, at which `body` is the state.
+    pub fn start(&mut self, task: Task, start: Tick, body: &BodyState) {
+        self.active = Some(ActiveTask {
+            task,
+            start,
+            hold: mrp::to_euler_parameters(&body.sigma_BN),
+            previous_sigma: None,
+            record: ImagingRecord::NEW,
+        });
+    }
+
+    /// Tick at which the task in hand ends.
+    #[must_use]
+    pub fn end(&self) -> Option<Tick> {
+        self.active.as_ref().map(|active| active.start.after(active.task.ticks()))
+    }
+
+    /// The task in hand.
+    #[must_use]
+    pub fn task(&self) -> Option<&Task> {
+        self.active.as_ref().map(|active| &active.task)
+    }
+
+    /// Evaluates the last sample of the task in hand at its end and puts it away. Before its end the task counts as
+    /// interrupted. `None` when there is no task.
+    pub fn finish(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState) -> Option<TaskOutcome> {
+        let mut active = self.active.take()?;
+        let interrupted = now < active.start.after(active.task.ticks());
+        if let (Task::Image { strip, t_pre, .. }, false) = (active.task, interrupted) {
+            let (sigma_BR, sin_el) = self.track(&strip, active.start, t_pre, now, r_BN_N, body);
+            active.record.add(&self.limits, sigma_BR.norm_squared(), sin_el);
+        }
+        Some(active.record.outcome(&self.limits, interrupted))
+    }
+
+    /// One control tick: the torque command computed from the state at `now`. Without a task the torque is zero.
+    #[inline]
+    pub fn tick(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState) -> GuidanceTick {
+        let Some(mut active) = self.active.take() else {
+            let error = TrackingError { sigma_BR: Vector3::zeros(), omega_BR_B: Vector3::zeros() };
+            return GuidanceTick { torque: Vector3::zeros(), error, sin_elevation: 1.0, imaging: false };
+        };
+        let (sigma_BR, sin_elevation, imaging) = match active.task {
+            Task::Image { strip, t_pre, .. } => {
+                let (sigma_BR, sin_el) = self.track(&strip, active.start, t_pre, now, r_BN_N, body);
+                let imaging = now >= active.start.after(t_pre);
+                if imaging {
+                    active.record.add(&self.limits, sigma_BR.norm_squared(), sin_el);
+                }
+                (sigma_BR, sin_el, imaging)
+            }
+            Task::Wait { .. } => {
+                let bn = mrp::to_euler_parameters(&body.sigma_BN);
+                (mrp::from_euler_parameters(&mrp::relative_euler_parameters(&bn, &active.hold)), 1.0, false)
+            }
+        };
+        let omega_BR_B = match &active.previous_sigma {
+            Some(previous) => rate_error(&sigma_BR, previous, self.dt),
+            None => Vector3::zeros(),
+        };
+        active.previous_sigma = Some(sigma_BR);
+        self.active = Some(active);
+        let error = TrackingError { sigma_BR, omega_BR_B };
+        let integral = &mut self.servo_integral;
+        let command = self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
+        GuidanceTick { torque: self.plant.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
+    }
+
+    /// σ_BR and the sine of the elevation while following a strip.
+    #[inline]
+    fn track(
+        &mut self,
+        strip: &Strip,
+        start: Tick,
+        t_pre: u32,
+        now: Tick,
+        r_BN_N: &Vector3<f64>,
+        body: &BodyState,
+    ) -> (Vector3<f64>, f64) {
+        let elapsed = now.since(start.after(t_pre)) as f64 * self.dt;
+        let (target_E, scan_E) = strip.target_E(elapsed);
+        let turn = self.earth.cos_sin(now);
+        let target_N = earth_to_inertial(turn, &target_E) * self.earth_radius;
+        let scan_N = earth_to_inertial(turn, &scan_E);
+        let rn = mrp::euler_parameters_from_dcm(&reference_dcm(r_BN_N, &target_N, &scan_N));
+        let bn = mrp::to_euler_parameters(&body.sigma_BN);
+        let sigma_BR = mrp::from_euler_parameters(&mrp::relative_euler_parameters(&bn, &rn));
+        (sigma_BR, sin_elevation(r_BN_N, &target_N))
+    }
+}
+
+/// ω_BR by backward difference of σ_BR over one tick (after eq. 11), over whichever MRP set of the previous error is
+/// nearer, so that a switch of sets is not read as a jump.
+#[inline]
+#[must_use]
+pub fn rate_error(sigma: &Vector3<f64>, previous: &Vector3<f64>, dt: f64) -> Vector3<f64> {
+    let mut difference = sigma - previous;
+    // Sets can only be confused when both are near the sphere ‖σ‖ = 1, where the jump is near 2.
+    if difference.norm_squared() > 1.0 {
+        let other = sigma - mrp::shadow(previous);
+        if other.norm_squared() < difference.norm_squared() {
+            difference = other;
+        }
+    }
+    mrp::rate_to_omega(sigma, &(difference / dt))
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    #[test]
+    fn a_switch_of_mrp_sets_is_no_jump() {
+        let before = Vector3::new(0.0, 0.0, 0.999);
+        let after = mrp::shadow(&Vector3::new(0.0, 0.0, 1.003));
+        let omega = rate_error(&after, &before, 0.5);
+        // σ = tan(θ/4): θ̇ = 4·atan difference over dt.
+        let expected = 4.0 * (libm::atan(1.003) - libm::atan(0.999)) / 0.5;
+        assert_relative_eq!(omega.z, expected, max_relative = 1e-2);
+    }
+}

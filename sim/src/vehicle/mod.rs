@@ -1,0 +1,11 @@
+//! The satellite: its body and wheels, its control and guidance, its errors, and the closed loop.
+
+pub mod control;
+pub mod dynamics;
+pub mod errors;
+pub mod executive;
+pub mod flight;
+pub mod guidance;
+pub mod initial;
+pub mod mrp;
+pub mod spacecraft;

@@ -1,0 +1,121 @@
+//! The spacecraft: the truth of its orbit, body and wheels, and what its sensors tell of it.
+
+use nalgebra::Vector3;
+
+use crate::error::SimError;
+use crate::model::Model;
+use crate::rng;
+use crate::time::Tick;
+use crate::vehicle::dynamics::{BodyState, Plant};
+use crate::vehicle::errors::{PlantErrors, Sensor};
+use crate::vehicle::initial::InitialState;
+use crate::world::orbit::Orbit;
+
+/// What the spacecraft tells of itself at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateSample {
+    /// Simulated time.
+    pub tick: Tick,
+    /// Position in N [m].
+    pub r_BN_N: Vector3<f64>,
+    /// Velocity in N [m/s].
+    pub v_BN_N: Vector3<f64>,
+    /// Attitude, rate and wheel speeds as the sensors measure them.
+    pub body: BodyState,
+    /// Attitude, rate and wheel speeds as they are, where the sensors are not exact.
+    pub truth: Option<BodyState>,
+    /// Torque that acted over the tick that ended here [N m].
+    pub torque_applied: Vector3<f64>,
+}
+
+/// The spacecraft: it integrates what it is told.
+#[derive(Clone, Debug)]
+pub struct Spacecraft {
+    /// Orbit.
+    pub orbit: Orbit,
+    /// True attitude, rate and wheel speeds at `now`.
+    pub body: BodyState,
+    /// Simulated time.
+    pub now: Tick,
+    /// Torque that acted over the tick that ended at `now` [N m].
+    pub torque_applied: Vector3<f64>,
+    plant: Plant,
+    measured: Option<Box<Measured>>,
+}
+
+/// What sensors that are not exact tell.
+#[derive(Clone, Debug)]
+struct Measured {
+    sensor: Sensor,
+    /// The state as it is measured at the present tick.
+    body: BodyState,
+}
+
+impl Spacecraft {
+    /// A spacecraft at the epoch.
+    #[must_use]
+    pub fn new(model: &Model, initial: &InitialState) -> Self {
+        Self::on_orbit(model, Orbit::new(&model.config, initial.orbit, model.period), initial.body, Tick(0))
+    }
+
+    /// A spacecraft on an orbit at some tick, with nothing acting on it yet.
+    #[must_use]
+    pub fn on_orbit(model: &Model, orbit: Orbit, body: BodyState, now: Tick) -> Self {
+        Self { orbit, body, now, torque_applied: Vector3::zeros(), plant: model.plant.clone(), measured: None }
+    }
+
+    /// From now on it differs from its model; `seed` is that of the sensors' noise.
+    ///
+    /// # Errors
+    /// When an error, or what it makes of the configuration, is out of range.
+    pub fn differ(&mut self, model: &Model, errors: &PlantErrors, seed: u64) -> Result<(), SimError> {
+        self.plant = errors.plant(model)?;
+        let body = self.body;
+        self.measured = errors
+            .sensor(rng::stream(seed, rng::SENSORS))
+            .map(|mut sensor| Box::new(Measured { body: sensor.measure(&body), sensor }));
+        Ok(())
+    }
+
+    /// From now on it has another body and wheels.
+    pub fn refit(&mut self, plant: Plant) {
+        self.plant = plant;
+    }
+
+    /// Attitude, rate and wheel speeds as the sensors measure them.
+    #[inline]
+    #[must_use]
+    pub fn measured(&self) -> &BodyState {
+        self.measured.as_ref().map_or(&self.body, |measured| &measured.body)
+    }
+
+    /// Attitude, rate and wheel speeds as they are, where the sensors are not exact.
+    #[inline]
+    #[must_use]
+    pub fn truth(&self) -> Option<&BodyState> {
+        self.measured.as_ref().map(|_| &self.body)
+    }
+
+    /// What it tells of itself now.
+    pub fn sample(&mut self) -> StateSample {
+        StateSample {
+            tick: self.now,
+            r_BN_N: self.orbit.position(self.now),
+            v_BN_N: self.orbit.velocity(self.now),
+            body: *self.measured(),
+            truth: self.truth().copied(),
+            torque_applied: self.torque_applied,
+        }
+    }
+
+    /// Integrates one tick under a torque command [N m], saturated as the wheels do it.
+    #[inline]
+    pub fn advance(&mut self, command: &Vector3<f64>) {
+        self.torque_applied = self.plant.saturate(command, &self.body.wheel_speed);
+        self.plant.step(&mut self.body, &self.torque_applied);
+        self.now = self.now.after(1);
+        if let Some(measured) = &mut self.measured {
+            measured.body = measured.sensor.measure(&self.body);
+        }
+    }
+}
