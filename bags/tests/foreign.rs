@@ -257,6 +257,18 @@ fn the_list_of_files_counts() {
 }
 
 #[test]
+fn a_bag_whose_files_were_renamed_is_read_and_told() {
+    let temp = tempfile::tempdir().unwrap();
+    let dir = copy("metadata_v8_iron", temp.path());
+    fs::rename(dir.join("v8_0.mcap"), dir.join("other.mcap")).unwrap();
+    let bag = Bag::open(&dir).unwrap();
+    assert_eq!((texts(&bag).len(), bag.faults().len()), (5, 2));
+    fs::remove_file(dir.join("other.mcap")).unwrap();
+    let error = Bag::open(&dir).unwrap_err().to_string();
+    assert!(error.ends_with("v8_0.mcap is missing, the bag's list has it"), "{error}");
+}
+
+#[test]
 fn lists_of_the_oldest_bags_begin_with_the_directory() {
     let temp = tempfile::tempdir().unwrap();
     let old = copy("metadata_v8_iron", temp.path());

@@ -40,11 +40,15 @@ impl Listing {
         match BagInformation::read(path) {
             Ok(Some(information)) if !information.relative_file_paths.is_empty() => {
                 listing.take_listed(path, &information, &there);
+                if listing.files.is_empty() && !there.is_empty() {
+                    listing.faults.push("every bag file beside the list is read".to_owned());
+                    (listing.files, listing.unlisted) = (there, Vec::new());
+                }
                 listing.information = Some(information);
             }
             Ok(information) => (listing.files, listing.information) = (there, information),
             Err(error) => {
-                listing.faults.push(format!("{}; every bag file beside it is read", chain(&error)));
+                listing.faults.push(format!("{}: every bag file beside it is read", chain(&error)));
                 listing.files = there;
             }
         }
