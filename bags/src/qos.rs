@@ -1,6 +1,6 @@
 //! ROS 2 QoS profiles as bags store them: a YAML list in rosbag2's words.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, collections::HashMap};
 
 use serde::{Deserialize, Serialize};
 
@@ -256,6 +256,24 @@ pub fn from_yaml(text: &str) -> Result<Vec<QosProfile>> {
     yaml_serde::from_str(text).map_err(|e| BagError::Qos { reason: e.to_string() })
 }
 
+/// Parses the texts of many topics, of which most are alike.
+#[derive(Default)]
+pub(crate) struct QosTexts {
+    known: HashMap<String, Vec<QosProfile>>,
+}
+
+impl QosTexts {
+    /// What a text says; nothing when it is at fault.
+    pub(crate) fn parse(&mut self, text: &str) -> Vec<QosProfile> {
+        if let Some(profiles) = self.known.get(text) {
+            return profiles.clone();
+        }
+        let profiles = from_yaml(text).unwrap_or_default();
+        self.known.insert(text.to_owned(), profiles.clone());
+        profiles
+    }
+}
+
 /// The text that a new bag holds for a text of another: the same, unless it has policies in numbers, which a bag of
 /// version 9 must not have.
 pub(crate) fn in_words(text: &str) -> Cow<'_, str> {
@@ -263,8 +281,11 @@ pub(crate) fn in_words(text: &str) -> Cow<'_, str> {
         let lines = text.lines().filter_map(|line| line.trim_start_matches(['-', ' ']).split_once(':'));
         lines.filter(|(key, _)| *key == "history").any(|(_, value)| value.trim().parse::<u64>().is_ok())
     };
+    if !has_numbers() {
+        return text.into();
+    }
     match from_yaml(text) {
-        Ok(profiles) if !profiles.is_empty() && has_numbers() => to_yaml(&profiles).unwrap_or_default().into(),
+        Ok(profiles) if !profiles.is_empty() => to_yaml(&profiles).unwrap_or_default().into(),
         _ => text.into(),
     }
 }

@@ -7,7 +7,7 @@ use mcap::records::Channel;
 use crate::{
     error::{BagError, Result},
     file::index::Schema,
-    qos::{self, QosProfile},
+    qos::{self, QosProfile, QosTexts},
 };
 
 /// The key of a channel's metadata under which QoS profiles stand.
@@ -70,18 +70,16 @@ impl Topic {
     }
 
     /// A channel of an MCAP file with its schema, as it stands.
-    pub(crate) fn of_channel(channel: &Channel, schema: Option<&Schema>) -> Self {
+    pub(crate) fn of_channel(channel: &Channel, schema: Option<&Schema>, texts: &mut QosTexts) -> Self {
         let definition = |schema: &Schema| Definition { encoding: schema.encoding.clone(), data: schema.data.clone() };
-        let mut topic = Self {
+        Self {
             name: channel.topic.clone(),
             type_name: schema.map(|schema| schema.name.clone()).unwrap_or_default(),
             definition: schema.map(definition),
             message_encoding: channel.message_encoding.clone(),
             metadata: channel.metadata.clone(),
-            qos: Vec::new(),
-        };
-        topic.qos = topic.offered_qos().and_then(Result::ok).unwrap_or_default();
-        topic
+            qos: channel.metadata.get(QOS).map(|text| texts.parse(text)).unwrap_or_default(),
+        }
     }
 
     /// What makes it the same topic as another.

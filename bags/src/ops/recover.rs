@@ -15,6 +15,7 @@ use crate::{
         unpack::{Unpacker, ZSTD_MAGIC},
         walk::{Place, Walk},
     },
+    qos::QosTexts,
     reader::{Attachment, Listing, Message, distinct},
     topic::Topic,
     writer::{BagOptions, BagSummary, BagWriter, TopicId},
@@ -82,11 +83,19 @@ struct Salvage<'a> {
     unpacker: Unpacker,
     /// A message that was compressed by itself.
     plain: Vec<u8>,
+    texts: QosTexts,
 }
 
 impl<'a> Salvage<'a> {
     fn new(index: FileIndex, writer: &'a BagWriter) -> Self {
-        Self { index, topics: BTreeMap::new(), writer, unpacker: Unpacker::default(), plain: Vec::new() }
+        Self {
+            index,
+            topics: BTreeMap::new(),
+            writer,
+            unpacker: Unpacker::default(),
+            plain: Vec::new(),
+            texts: QosTexts::default(),
+        }
     }
 
     fn save(&mut self, faults: &mut Vec<String>) {
@@ -211,7 +220,8 @@ impl<'a> Salvage<'a> {
         let unknown = || self.fault(offset, format!("message of unknown channel {id}"));
         let channel = self.index.channels.get(&id).ok_or_else(unknown)?;
         let schema = self.index.schemas.get(&channel.schema_id);
-        let topic = self.writer.add_topic(&Topic::of_channel(channel, schema))?;
+        let topic = Topic::of_channel(channel, schema, &mut self.texts);
+        let topic = self.writer.add_topic(&topic)?;
         self.topics.insert(id, topic);
         Ok(topic)
     }

@@ -24,6 +24,7 @@ use crate::{
         walk::Place,
     },
     metadata::BagInformation,
+    qos::QosTexts,
     schema,
     topic::{Topic, TopicKey},
     writer::{Losses, RECORDING},
@@ -193,10 +194,10 @@ impl Bag {
     /// Puts files in order of time, and their topics together.
     fn take_files(&mut self, mut files: Vec<FileIndex>) -> Result<()> {
         files.sort_by_key(|file| (start_of(file).is_none(), start_of(file)));
-        let mut known = HashMap::new();
+        let (mut known, mut texts) = (HashMap::new(), QosTexts::default());
         let mut first_error = None;
         for file in files {
-            if let Err(error) = self.add_file(file, &mut known) {
+            if let Err(error) = self.add_file(file, &mut known, &mut texts) {
                 self.faults.push(format!("not read: {}", chain(&error)));
                 first_error.get_or_insert(error);
             }
@@ -213,7 +214,7 @@ impl Bag {
         Ok(())
     }
 
-    fn add_file(&mut self, file: FileIndex, known: &mut HashMap<TopicKey, usize>) -> Result<()> {
+    fn add_file(&mut self, file: FileIndex, known: &mut HashMap<TopicKey, usize>, texts: &mut QosTexts) -> Result<()> {
         let topics = file.channels.iter().map(|(id, channel)| {
             let missing = || {
                 let reason = format!("channel {} refers to no schema {}", channel.topic, channel.schema_id);
@@ -223,7 +224,7 @@ impl Bag {
                 0 => None,
                 schema => Some(file.schemas.get(&schema).ok_or_else(missing)?),
             };
-            Ok((*id, Topic::of_channel(channel, schema)))
+            Ok((*id, Topic::of_channel(channel, schema, texts)))
         });
         let mut by_channel = BTreeMap::new();
         for (id, topic) in topics.collect::<Result<Vec<_>>>()? {
