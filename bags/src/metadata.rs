@@ -122,9 +122,10 @@ impl BagInformation {
             .map_err(|e| BagError::Metadata { path: path.to_owned(), reason: e.to_string() })
     }
 
-    /// Parses the information that an MCAP or SQLite file of rosbag2 holds itself.
+    /// Parses the information that an MCAP or SQLite file of rosbag2 holds itself, without topics.
     pub(crate) fn parse_embedded(text: &str) -> Option<Self> {
-        yaml_serde::from_str(text).ok()
+        let parsed = yaml_serde::from_str(&without_topics(text)).or_else(|_| yaml_serde::from_str(text)).ok()?;
+        Some(Self { topics_with_message_count: Vec::new(), ..parsed })
     }
 
     /// Reads `<dir>/metadata.yaml`; `None` when there is no such file.
@@ -132,14 +133,26 @@ impl BagInformation {
     /// # Errors
     /// [`BagError::Metadata`] when it is of a later version or of another shape.
     pub fn read(dir: &Path) -> Result<Option<Self>> {
+        Self::read_by(dir, |text| yaml_serde::from_str(text))
+    }
+
+    /// As [`read`](Self::read), but without topics: those of tens of thousands take a second.
+    pub(crate) fn read_without_topics(dir: &Path) -> Result<Option<Self>> {
+        // What was left out may have been more than topics, or less.
+        let parsed = Self::read_by(dir, |text| {
+            yaml_serde::from_str(&without_topics(text)).or_else(|_| yaml_serde::from_str(text))
+        })?;
+        Ok(parsed.map(|information| Self { topics_with_message_count: Vec::new(), ..information }))
+    }
+
+    fn read_by(dir: &Path, parse: impl Fn(&str) -> yaml_serde::Result<Document>) -> Result<Option<Self>> {
         let path = dir.join(FILE_NAME);
         let text = match fs::read_to_string(&path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(BagError::io("read", &path)(e)),
         };
-        let document: Document = yaml_serde::from_str(&text)
-            .map_err(|e| BagError::Metadata { path: path.clone(), reason: e.to_string() })?;
+        let document = parse(&text).map_err(|e| BagError::Metadata { path: path.clone(), reason: e.to_string() })?;
         let information = document.rosbag2_bagfile_information;
         if !(1..=VERSION).contains(&information.version) {
             let reason = format!("version {} is outside 1 to {VERSION}", information.version);
@@ -163,6 +176,25 @@ impl BagInformation {
             BagError::io("write", &path)(e)
         })
     }
+}
+
+/// The text with an empty list in place of the block of topics.
+fn without_topics(text: &str) -> String {
+    let mut kept = String::new();
+    let mut block = None;
+    for line in text.split_inclusive('\n') {
+        let content = line.trim_start_matches(' ');
+        let indent = line.len() - content.len();
+        // An item of a list may stand as far to the left as the list's name.
+        if block.is_some_and(|name| indent > name || indent == name && content.starts_with("- ")) {
+            continue;
+        }
+        let is_topics = content.trim_end() == "topics_with_message_count:";
+        block = is_topics.then_some(indent);
+        kept.push_str(if is_topics { line.trim_end() } else { line });
+        kept.push_str(if is_topics { " []\n" } else { "" });
+    }
+    kept
 }
 
 /// A time; one before the epoch, which a clock that was not set gives, counts as the epoch.
@@ -222,7 +254,15 @@ mod tests {
         );
         let temp = tempfile::tempdir().unwrap();
         fs::write(temp.path().join(FILE_NAME), text).unwrap();
-        BagInformation::read(temp.path()).map(Option::unwrap)
+        let whole = BagInformation::read(temp.path()).map(Option::unwrap);
+        let brief = BagInformation::read_without_topics(temp.path()).map(Option::unwrap);
+        match (&whole, brief) {
+            (Ok(whole), Ok(brief)) => {
+                assert_eq!(brief, BagInformation { topics_with_message_count: vec![], ..whole.clone() });
+            }
+            (whole, brief) => assert_eq!(whole.as_ref().unwrap_err().to_string(), brief.unwrap_err().to_string()),
+        }
+        whole
     }
 
     #[test]
@@ -246,6 +286,34 @@ mod tests {
         assert_eq!((custom_data["vehicle"].as_str(), custom_data["number"].as_str()), ("sat-7", "7"));
         let nothing = read(9, ", type_description_hash: ~", "  custom_data: ~\n  files: ~\n  ros_distro: ~\n").unwrap();
         assert_eq!((nothing.custom_data, nothing.ros_distro.as_str()), (None, ""));
+    }
+
+    #[test]
+    fn topics_are_left_out_where_they_form_a_block() {
+        let temp = tempfile::tempdir().unwrap();
+        let topic_metadata = TopicMetadata {
+            name: "/a".into(),
+            type_name: "b/msg/C".into(),
+            serialization_format: "cdr".into(),
+            offered_qos_profiles: vec![QosProfile::reliable(1)],
+            type_description_hash: String::new(),
+        };
+        let topics = vec![TopicCount { topic_metadata, message_count: 2 }; 2];
+        let information = BagInformation {
+            version: 9,
+            topics_with_message_count: topics,
+            ros_distro: "jazzy".into(),
+            ..BagInformation::default()
+        };
+        let text = information.to_yaml(temp.path()).unwrap();
+        let brief = BagInformation { topics_with_message_count: vec![], ..information };
+        let commented = text.replacen("- topic_metadata", "# of a kind\n\n  - topic_metadata", 1);
+        let behind = text.replacen("  - topic_metadata", "# far to the left\n  - topic_metadata", 1);
+        let lines = text.replace('\n', "\r\n");
+        for text in [text, commented, behind, lines] {
+            fs::write(temp.path().join(FILE_NAME), &text).unwrap();
+            assert_eq!(BagInformation::read_without_topics(temp.path()).unwrap().unwrap(), brief, "{text}");
+        }
     }
 
     #[test]

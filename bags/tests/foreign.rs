@@ -118,7 +118,8 @@ fn qos_in_numbers_is_read_and_written_in_words() {
     let again = Bag::open(&temp.path().join("filtered")).unwrap();
     assert_eq!(again.topics()[1].topic.qos, map.topic.qos);
     assert!(fs::read(&file).unwrap().windows(27).any(|bytes| bytes == b"durability: transient_local"));
-    let listed = &again.information().unwrap().topics_with_message_count[1].topic_metadata;
+    let listed =
+        BagInformation::read(again.path()).unwrap().unwrap().topics_with_message_count.remove(1).topic_metadata;
     assert_eq!(listed.offered_qos_profiles, map.topic.qos);
     let facts: Value = serde_json::from_str(&run_python("read_rosbags.py", &temp.path().join("filtered"))).unwrap();
     assert_eq!(

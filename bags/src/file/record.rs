@@ -52,12 +52,24 @@ pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
     })
 }
 
-/// A message record's header and data.
+/// A message record's header and data; field by field, because the parser's general way costs a third of the time in
+/// which a bag is read.
+#[inline]
 pub(crate) fn message(body: &[u8]) -> Result<(MessageHeader, &[u8]), String> {
-    match MessageHeader::read_le(&mut Cursor::new(body)) {
-        Ok(header) => Ok((header, &body[MESSAGE_HEADER_LEN..])),
-        Err(_) => Err(format!("message record of {} bytes", body.len())),
+    fn fields(body: &[u8]) -> Option<(MessageHeader, &[u8])> {
+        let (channel_id, rest) = body.split_first_chunk()?;
+        let (sequence, rest) = rest.split_first_chunk()?;
+        let (log_time, rest) = rest.split_first_chunk()?;
+        let (publish_time, data) = rest.split_first_chunk()?;
+        let header = MessageHeader {
+            channel_id: u16::from_le_bytes(*channel_id),
+            sequence: u32::from_le_bytes(*sequence),
+            log_time: u64::from_le_bytes(*log_time),
+            publish_time: u64::from_le_bytes(*publish_time),
+        };
+        Some((header, data))
     }
+    fields(body).ok_or_else(|| format!("message record of {} bytes", body.len()))
 }
 
 /// An attachment's header and the length of its data, and how many bytes of the body they take; `start` need not be

@@ -256,9 +256,9 @@ impl<'a> Engine<'a> {
     /// Waits until reliable readers have everything; whether they have.
     pub(super) fn flush(&self, timeout: Duration) -> bool {
         let deadline = Instant::now() + timeout;
-        let publishers = self.outlets.publishers.iter();
-        publishers
-            .fold(true, |all, publisher| publisher.flush(deadline.saturating_duration_since(Instant::now())) && all)
+        // Where one has waited in vain no time is left for the others.
+        let mut publishers = self.outlets.publishers.iter();
+        publishers.all(|publisher| publisher.flush(deadline.saturating_duration_since(Instant::now())))
     }
 
     /// The log time at which the next clock message is due [ns].

@@ -17,7 +17,7 @@ use crate::{
 pub(crate) struct Listing {
     /// The files, those first that are first in the list.
     pub files: Vec<PathBuf>,
-    /// What the bag says of itself.
+    /// What the bag says of itself, without its topics.
     pub information: Option<BagInformation>,
     /// What is missing or cannot be understood.
     pub faults: Vec<String>,
@@ -37,7 +37,7 @@ impl Listing {
         }
         let there = files_in(path)?;
         let mut listing = Self::default();
-        match BagInformation::read(path) {
+        match BagInformation::read_without_topics(path) {
             Ok(Some(information)) if !information.relative_file_paths.is_empty() => {
                 listing.take_listed(path, &information, &there);
                 if listing.files.is_empty() && !there.is_empty() {

@@ -351,7 +351,7 @@ impl Bag {
         losses
     }
 
-    /// `metadata.yaml`, or what a single file of rosbag2 says in its place.
+    /// `metadata.yaml`, or what a single file of rosbag2 says in its place, but for the topics: see [`topics`](Self::topics).
     pub fn information(&self) -> Option<&BagInformation> {
         self.information.as_ref()
     }
