@@ -48,7 +48,9 @@ impl Listing {
             }
             Ok(information) => (listing.files, listing.information) = (there, information),
             Err(error) => {
-                listing.faults.push(format!("{}: every bag file beside it is read", chain(&error)));
+                let instead =
+                    if there.is_empty() { "no bag file lies beside it" } else { "every bag file beside it is read" };
+                listing.faults.push(format!("{}: {instead}", chain(&error)));
                 listing.files = there;
             }
         }
