@@ -412,7 +412,7 @@ fn two_topics(dir: &Path) -> Vec<usize> {
             bag.write(topic, time, time, &message).unwrap();
         }
         // Chunks end at their size: the last of a topic is filled up with the topic's own.
-        while bag.counter().messages() % 4 != 0 {
+        while !bag.counter().messages().is_multiple_of(4) {
             bag.write(topic, 20, 20, &message).unwrap();
         }
     }

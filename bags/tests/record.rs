@@ -252,7 +252,7 @@ fn a_tap_hands_topic_type_stamp_and_bytes_to_any_sink() {
     let environment = Environment { domain: 20, localhost_only: false, mapping: Mapping::Cyclone };
     let listening = Node::start_in(environment, graph::OPERATOR, &args).unwrap();
     let name = "/swath/spacecraft/state".to_owned();
-    let topics = TopicPattern::new(&[name.clone()], None, None).unwrap();
+    let topics = TopicPattern::new(std::slice::from_ref(&name), None, None).unwrap();
     let mut tap = Tap::new(listening, Selection { topics, depth: 1000, ..Selection::default() }).unwrap();
     wait_until("the tap is heard", || states.matched() > 0);
     (1..=20).for_each(|tick| states.publish(&state(tick)).unwrap());
