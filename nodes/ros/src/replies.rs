@@ -69,7 +69,7 @@ impl Replies {
             held.drain(..).partition(|reply| now >= reply.until || self.writer.is_heard_by(reply.process));
         *held = waiting;
         drop(held);
-        for reply in VecDeque::from(ready) {
+        for reply in ready {
             if let Err(error) = self.write(reply) {
                 tracing::warn!("{error}");
             }
