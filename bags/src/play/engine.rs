@@ -256,9 +256,11 @@ impl<'a> Engine<'a> {
     /// Waits until reliable readers have everything; whether they have.
     pub(super) fn flush(&self, timeout: Duration) -> bool {
         let deadline = Instant::now() + timeout;
-        // Where one has waited in vain no time is left for the others.
-        let mut publishers = self.outlets.publishers.iter();
-        publishers.all(|publisher| publisher.flush(deadline.saturating_duration_since(Instant::now())))
+        let mut all = true;
+        for publisher in &self.outlets.publishers {
+            all &= publisher.flush(deadline.saturating_duration_since(Instant::now()));
+        }
+        all
     }
 
     /// The log time at which the next clock message is due [ns].

@@ -37,8 +37,8 @@ fn tokens(text: &str, first_line: usize) -> Result<Vec<Token<'_>>, DefinitionErr
             first.len_utf8()
         } else if first == '#' || rest.starts_with("//") {
             rest.find('\n').unwrap_or(rest.len())
-        } else if let Some(inside) = rest.strip_prefix("/*") {
-            inside.find("*/").map_or(rest.len(), |end| end + 4)
+        } else if let Some(comment) = rest.strip_prefix("/*") {
+            comment.find("*/").map_or(rest.len(), |end| end + 4)
         } else {
             let len = match first {
                 '"' | '\'' => literal_len(rest, first),

@@ -101,7 +101,7 @@ pub fn operator_action(stamper: &Stamper, action: &Action) -> msg::OperatorActio
             let submitted = matches!(action.act, Act::Submit(..));
             message.action = if submitted { To::ACTION_SUBMIT } else { To::ACTION_REPLACE };
             message.strip_id = id.0;
-            message.request = vec![strip_request(named)].into();
+            message.request = vec![strip_request(named)];
         }
         Act::Cancel(id) => (message.action, message.strip_id) = (To::ACTION_CANCEL, id.0),
         Act::Review(id, review) => {

@@ -117,6 +117,7 @@ impl Shared {
         let mut health = Health::new();
         while !self.stop.load(Ordering::Relaxed) {
             self.take_events(&hearing.listener);
+            self.roster.release_replies();
             let before = self.roster.revision();
             self.take_all(&hearing.announcements, |sample| self.roster.note_nodes(&sample.cdr));
             self.take_all(&hearing.identities, |sample| self.note_identity(sample));

@@ -106,6 +106,16 @@ impl RawPublisher {
         self.slot.flush(timeout)
     }
 
+    /// Whether a reader of that process hears this writer.
+    pub(crate) fn is_heard_by(&self, process: Prefix) -> bool {
+        self.roster.is_matched_with(self.gid(), process)
+    }
+
+    /// What this process knows of the others.
+    pub(crate) fn roster(&self) -> &Arc<Roster> {
+        &self.roster
+    }
+
     /// Readers that this writer sends to.
     pub fn matched(&self) -> usize {
         self.roster.matched(self.gid()).len()
@@ -124,6 +134,7 @@ impl RawPublisher {
 
 impl Drop for RawPublisher {
     fn drop(&mut self) {
+        self.slot.take_leave();
         self.roster.withdraw(Direction::Write, self.gid());
     }
 }

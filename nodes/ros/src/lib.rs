@@ -55,6 +55,7 @@ mod notices;
 mod param_services;
 mod params;
 pub mod qos;
+mod replies;
 mod roster;
 mod rtps;
 mod service;

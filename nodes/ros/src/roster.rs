@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use rustdds::{DomainParticipantStatusEvent, EndpointDescription, Timestamp};
@@ -18,6 +18,7 @@ use crate::minder::{Minder, PROBE};
 use crate::names::Names;
 use crate::notices::{Notices, Trouble};
 use crate::qos::is_reliable;
+use crate::replies::Replies;
 use crate::rtps::{Described, Prefix};
 use crate::signal::lock;
 use crate::slot::WriterSlot;
@@ -46,6 +47,8 @@ pub(crate) struct Roster {
     /// What went wrong with the messages of others.
     pub(crate) notices: Notices,
     state: Mutex<State>,
+    /// Responses that may wait for their clients.
+    replies: Mutex<Vec<Weak<Replies>>>,
     changed: Condvar,
     /// Grows whenever it may have changed who counts.
     revision: AtomicU64,
@@ -92,6 +95,7 @@ impl Roster {
             member,
             notices: Notices::default(),
             state: Mutex::new(State::new(own, members)),
+            replies: Mutex::default(),
             changed: Condvar::new(),
             revision: AtomicU64::new(0),
         }
@@ -339,6 +343,26 @@ impl Roster {
     /// Whether discovery has noted the minder's probe since this was last called.
     pub(crate) fn take_probed(&self) -> bool {
         std::mem::take(&mut lock(&self.state).probed)
+    }
+
+    /// From now on these responses are released when their clients are there.
+    pub(crate) fn mind_replies(&self, replies: &Arc<Replies>) {
+        let mut all = lock(&self.replies);
+        all.retain(|replies| replies.strong_count() > 0);
+        all.push(Arc::downgrade(replies));
+    }
+
+    /// Sends the responses that need not wait any longer.
+    pub(crate) fn release_replies(&self) {
+        let all: Vec<Arc<Replies>> = lock(&self.replies).iter().filter_map(Weak::upgrade).collect();
+        let now = Instant::now();
+        all.iter().for_each(|replies| replies.release(now));
+    }
+
+    /// Whether this endpoint of ours is matched with one of that process.
+    pub(crate) fn is_matched_with(&self, own: Gid, process: Prefix) -> bool {
+        let state = lock(&self.state);
+        state.matched.get(&own).into_iter().flatten().any(|gid| gid.prefix() == process)
     }
 
     pub(crate) fn matched(&self, own: Gid) -> Vec<Gid> {

@@ -5,6 +5,7 @@
 //! them into the DDS sample's header.
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -13,9 +14,11 @@ use serde::{Deserialize, Serialize};
 use swath_msgs::{RosMessage, RosService};
 
 use crate::cdr::Cdr;
-use crate::endpoint::{RawPublisher, RawSample, RawSubscription};
+use crate::endpoint::{Gid, RawPublisher, RawSample, RawSubscription};
 use crate::error::RosError;
 use crate::message::{decode, decode_as, encode, encode_as};
+use crate::replies::{Replies, Reply};
+use crate::rtps::Prefix;
 use crate::signal::Signal;
 
 /// How requests and responses are told apart.
@@ -40,6 +43,8 @@ impl Mapping {
 /// Names a request among all requests of all clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RequestId {
+    /// The client's process.
+    process: Prefix,
     client: [u8; 16],
     number: i64,
 }
@@ -54,8 +59,12 @@ struct Framed<M> {
 }
 
 impl RequestId {
+    fn new(client: Gid, number: i64) -> Self {
+        Self { process: client.prefix(), client: client.0, number }
+    }
+
     fn of(identity: SampleIdentity) -> Self {
-        Self { client: identity.writer_guid.to_bytes(), number: identity.sequence_number.into() }
+        Self::new(identity.writer_guid.into(), identity.sequence_number.into())
     }
 
     fn identity(self) -> SampleIdentity {
@@ -88,16 +97,16 @@ impl Mapping {
     }
 
     /// Takes a request or response apart. `client` is whose first half of the identity counts.
-    fn unwrap<M: RosMessage>(self, sample: &RawSample, client: [u8; 16]) -> Result<(RequestId, M), RosError> {
+    fn unwrap<M: RosMessage>(self, sample: &RawSample, client: Gid) -> Result<(RequestId, M), RosError> {
         match self {
             Self::Cyclone => {
                 let framed: Framed<M> = decode_as(M::TYPE_NAME, &sample.cdr)?;
-                let mut id = RequestId { client, number: framed.number };
+                let mut id = RequestId::new(client, framed.number);
                 id.client[8..].copy_from_slice(&framed.client);
                 Ok((id, framed.message))
             }
             Self::Enhanced => {
-                let own = RequestId { client: sample.info.writer.0, number: sample.info.sequence_number };
+                let own = RequestId::new(sample.info.writer, sample.info.sequence_number);
                 let id = match sample.info.related.map(RequestId::of) {
                     Some(related) if related.number == i64::from(SequenceNumber::UNKNOWN) => {
                         RequestId { number: own.number, ..related }
@@ -114,13 +123,16 @@ impl Mapping {
 /// Serves a service.
 pub struct Server<S> {
     requests: RawSubscription,
-    responses: RawPublisher,
+    responses: Arc<Replies>,
     mapping: Mapping,
     service: PhantomData<fn() -> S>,
 }
 
 impl<S: RosService> Server<S> {
     pub(crate) fn new(requests: RawSubscription, responses: RawPublisher, mapping: Mapping) -> Self {
+        let roster = Arc::clone(responses.roster());
+        let responses = Arc::new(Replies::new(responses));
+        roster.mind_replies(&responses);
         Self { requests, responses, mapping, service: PhantomData }
     }
 
@@ -131,7 +143,7 @@ impl<S: RosService> Server<S> {
     /// Bytes that are no such request are passed over and counted (`Node::notices`).
     pub fn take(&self) -> Result<Option<(RequestId, S::Request)>, RosError> {
         while let Some(sample) = self.requests.take()? {
-            match self.mapping.unwrap(&sample, sample.info.writer.0) {
+            match self.mapping.unwrap(&sample, sample.info.writer) {
                 Ok(request) => return Ok(Some(request)),
                 Err(error) => self.requests.note_unreadable(|| error.to_string()),
             }
@@ -140,9 +152,11 @@ impl<S: RosService> Server<S> {
     }
 
     /// Answers a request.
+    ///
+    /// The response is sent when the client's reader is matched, or after two seconds.
     pub fn respond(&self, id: RequestId, response: S::Response) -> Result<(), RosError> {
         let cdr = self.mapping.wrap(id, response)?;
-        self.responses.send(cdr, self.mapping.beside(id)).map(|_| ())
+        self.responses.send(Reply::new(id.process, cdr, self.mapping.beside(id)))
     }
 
     /// Answers all requests that have come, and returns how many.
@@ -187,7 +201,7 @@ impl<S: RosService> Client<S> {
     /// Sends a request, and returns the id that its response will have.
     pub fn send(&self, request: S::Request) -> Result<RequestId, RosError> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
-        let id = RequestId { client: self.requests.gid().0, number };
+        let id = RequestId::new(self.requests.gid(), number);
         let cdr = self.mapping.wrap(id, request)?;
         let sent = self.requests.send(cdr, None)?;
         Ok(match self.mapping {
@@ -198,10 +212,10 @@ impl<S: RosService> Client<S> {
 
     /// The next response to a request of this client, if there is one.
     pub fn take(&self) -> Result<Option<(RequestId, S::Response)>, RosError> {
-        let own = self.requests.gid().0;
+        let own = self.requests.gid();
         while let Some(sample) = self.responses.take()? {
             match self.mapping.unwrap(&sample, own) {
-                Ok((id, response)) if id.client == own => return Ok(Some((id, response))),
+                Ok((id, response)) if id.client == own.0 => return Ok(Some((id, response))),
                 // Meant for another client.
                 Ok(_) => {}
                 Err(error) => self.responses.note_unreadable(|| error.to_string()),
@@ -247,7 +261,7 @@ mod tests {
     use swath_msgs::std_msgs::String as Text;
 
     use super::*;
-    use crate::endpoint::{Gid, SampleInfo};
+    use crate::endpoint::SampleInfo;
 
     fn sample(cdr: Cdr, related: Option<SampleIdentity>) -> RawSample {
         let writer = Gid(std::array::from_fn(|index| index as u8));
@@ -270,8 +284,8 @@ mod tests {
 
     #[test]
     fn cyclone_frames_carry_client_and_number_before_the_message() {
-        let client = std::array::from_fn(|index| index as u8);
-        let id = RequestId { client, number: 7 };
+        let client = Gid(std::array::from_fn(|index| index as u8));
+        let id = RequestId::new(client, 7);
         let text = Text { data: "a".to_owned() };
         let cdr = Mapping::Cyclone.wrap(id, text.clone()).unwrap();
         let expected =
@@ -284,12 +298,12 @@ mod tests {
     #[test]
     fn enhanced_requests_are_named_by_the_sample() {
         let text = Text { data: "a".to_owned() };
-        let id = RequestId { client: [9; 16], number: 7 };
+        let id = RequestId::new(Gid([9; 16]), 7);
         let cdr = Mapping::Enhanced.wrap(id, text.clone()).unwrap();
         assert_eq!(cdr, encode(&text).unwrap());
         let unwrap = |related| {
             let sample = sample(cdr.clone(), related);
-            Mapping::Enhanced.unwrap::<Text>(&sample, [0; 16]).unwrap().0
+            Mapping::Enhanced.unwrap::<Text>(&sample, Gid([0; 16])).unwrap().0
         };
         assert_eq!(unwrap(Some(id.identity())), id);
         assert_eq!(unwrap(None).number, 5);

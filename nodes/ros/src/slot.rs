@@ -2,10 +2,10 @@
 
 use std::any::Any;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::task::{Wake, Waker};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rustdds::dds::{ReadResult, WriteResult};
 use rustdds::no_key::{DataWriter, DeserializedCacheChange, SimpleDataReader};
@@ -17,6 +17,13 @@ use crate::endpoint::Gid;
 use crate::error::RosError;
 use crate::qos::{Durability, QosProfile};
 use crate::signal::{Signal, lock};
+
+/// How long the last samples of a writer that goes may take to arrive.
+const LAST_WORDS: Duration = Duration::from_millis(100);
+
+/// How long its readers have to hand them out: a reader of RustDDS forgets what it has not handed out yet when the
+/// writer goes.
+const LINGER: Duration = Duration::from_millis(50);
 
 type DdsWriter = DataWriter<Cdr, Adapter>;
 type DdsReader = SimpleDataReader<Cdr, Adapter>;
@@ -49,12 +56,15 @@ pub(crate) struct WriterSlot {
     writer: RwLock<DdsWriter>,
     /// The last sample, if it is kept for readers that come later.
     last: Mutex<Option<(Cdr, WriteOptions)>>,
+    born: Instant,
+    /// When it wrote last [ms after `born`]; 0 if it never has.
+    written: AtomicU64,
 }
 
 impl WriterSlot {
     pub(crate) fn new(plan: Plan, entities: &Entities) -> Result<Self, RosError> {
         let writer = RwLock::new(entities.writer(&plan)?);
-        Ok(Self { plan, writer, last: Mutex::default() })
+        Ok(Self { plan, writer, last: Mutex::default(), born: Instant::now(), written: AtomicU64::new(0) })
     }
 
     /// Writes a sample; waits for at most `qos::BLOCKING`.
@@ -62,12 +72,28 @@ impl WriterSlot {
         if self.plan.qos.durability == Durability::TransientLocal {
             *lock(&self.last) = Some((cdr.clone(), options.clone()));
         }
+        self.written.store(self.age_ms().max(1), Ordering::Relaxed);
         read(&self.writer).write_with_options(cdr, options)
     }
 
     /// Waits until every reliable reader has all samples, and tells whether that is so.
     pub(crate) fn flush(&self, timeout: Duration) -> bool {
         read(&self.writer).wait_for_acknowledgments(timeout).unwrap_or(false)
+    }
+
+    fn age_ms(&self) -> u64 {
+        self.born.elapsed().as_millis() as u64
+    }
+
+    /// Waits until the last samples can be expected to have arrived, before the writer goes.
+    pub(crate) fn take_leave(&self) {
+        let written = self.written.load(Ordering::Relaxed);
+        if written == 0 {
+            return;
+        }
+        self.flush(LAST_WORDS);
+        let quiet = Duration::from_millis(self.age_ms().saturating_sub(written));
+        std::thread::sleep(LINGER.saturating_sub(quiet));
     }
 
     /// The writer's identity.

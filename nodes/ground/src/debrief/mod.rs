@@ -17,6 +17,7 @@ use swath_mission::guarded::Policies;
 
 /// All commands of `swath-bag`.
 #[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "one value a process")]
 pub enum Command {
     /// What any bag can.
     #[command(flatten)]

@@ -12,6 +12,7 @@ use swath_msgs::swath_msgs::{
 use swath_ros::{Mapping, RosError, Spec, Value, decode, encode, graph};
 
 use crate::common::{PATIENCE, Trial, eventually};
+use crate::stranger::Stranger;
 
 #[test]
 fn states_and_torques_go_both_ways_and_none_is_lost() {
@@ -58,6 +59,36 @@ fn a_late_reader_gets_what_is_latched() {
     let received = late.subscription(&graph::REQUEST_SUMMARY).unwrap();
     let summary = eventually(|| received.take().unwrap().filter(|summary| summary.tick == 3));
     assert_eq!(summary, RequestSummary { tick: 3, ..Default::default() });
+}
+
+/// A reader that is in no hurry still gets what a node said before it ended.
+#[test]
+fn the_last_words_of_a_node_are_heard() {
+    let trial = Trial::new(25);
+    let operator = trial.start(graph::OPERATOR, "").unwrap();
+    let received = operator.subscription(&graph::SPACECRAFT_STATE).unwrap();
+    for tick in 0..5 {
+        let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+        let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
+        eventually(|| (states.matched() == 1 && received.matched() > 0).then_some(()));
+        std::thread::sleep(Duration::from_millis(300));
+        let reading = std::thread::scope(|scope| {
+            let reading = scope.spawn(|| {
+                let deadline = Instant::now() + PATIENCE;
+                while Instant::now() < deadline {
+                    if let Some(state) = received.take().unwrap() {
+                        return Some(state.tick);
+                    }
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+                None
+            });
+            states.publish(&SpacecraftState { tick, ..Default::default() }).unwrap();
+            drop((states, spacecraft));
+            reading.join().unwrap()
+        });
+        assert_eq!(reading, Some(tick));
+    }
 }
 
 #[test]
@@ -128,6 +159,24 @@ fn services_answer_with_the_mapping_of_cyclone() {
 #[test]
 fn services_answer_with_the_enhanced_mapping() {
     services_answer(&Trial::new(4), Mapping::Enhanced);
+}
+
+/// A client is often seen in two halves, the writer of its requests first.
+#[test]
+fn a_response_waits_until_its_client_can_hear_it() {
+    let trial = Trial::new(24);
+    let manager = trial.start(graph::REQUEST_MANAGER, "").unwrap();
+    let server = manager.server(&graph::SUBMIT_STRIPS).unwrap();
+    let service = trial.full("requests/submit");
+    let mut client = Stranger::new(trial.domain, 1);
+    client.announce_writer(&format!("rq{service}Request"), "swath_msgs::srv::dds_::SubmitStrips_Request_");
+    std::thread::sleep(Duration::from_millis(300));
+    let header = [&b"stranger"[..], &7_u64.to_le_bytes()].concat();
+    client.write(1, &[&[0, 1, 0, 0][..], &header, &[0; 4]].concat());
+    eventually(|| (server.answer_all(judge).unwrap() == 1).then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    client.announce_reader(&format!("rr{service}Reply"), "swath_msgs::srv::dds_::SubmitStrips_Response_");
+    client.receive(&header);
 }
 
 #[test]
