@@ -5,6 +5,7 @@
 mod common;
 
 use std::{
+    os::unix::fs::PermissionsExt,
     path::Path,
     process::{Command, Output, Stdio},
 };
@@ -13,7 +14,7 @@ use common::{cdr, state, write_sample};
 use swath_bags::{Bag, BagOptions, metadata::BagInformation, qos::Durability};
 
 fn swath_bag(dir: &Path, args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
     command.current_dir(dir).args(args).output().unwrap()
 }
 
@@ -111,7 +112,7 @@ fn faults_and_mistakes_end_with_code_1_and_a_reason() {
 #[test]
 fn a_closed_pipe_is_no_failure() {
     let temp = sample();
-    let mut cat = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+    let mut cat = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
     let mut cat = cat.current_dir(temp.path()).args(["cat", "bag"]).stdout(Stdio::piped()).spawn().unwrap();
     drop(cat.stdout.take());
     assert!(cat.wait().unwrap().success());
@@ -227,4 +228,26 @@ fn info_tells_more_on_request() {
     let json: serde_json::Value = serde_json::from_str(&run(temp.path(), &["info", "bag", "-v", "--json"])).unwrap();
     assert_eq!(json["topics"][0]["schema_encoding"], "ros2msg");
     assert_eq!(json["topics"][2]["message_bytes"], bytes);
+}
+
+#[test]
+fn what_knows_missions_is_run_by_the_program_beside() {
+    let temp = tempfile::tempdir().unwrap();
+    let dir = temp.path();
+    std::fs::copy(env!("CARGO_BIN_EXE_swath-bag"), dir.join("swath-bag")).unwrap();
+    let words = ["refly", "a bag", "--planner", "beam", "--help", "-x", "-1"];
+    let run = || Command::new(dir.join("swath-bag")).args(words).output().unwrap();
+    let said = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+
+    let missing = run();
+    assert_eq!(missing.status.code(), Some(1));
+    let expected = format!("error: cannot run {}: No such file or directory", dir.join("swath").display());
+    assert!(said(&missing.stderr).contains(&expected), "{}", said(&missing.stderr));
+
+    std::fs::write(dir.join("swath"), "#!/bin/sh\nprintf '<%s>' \"$@\"\nexit 7\n").unwrap();
+    std::fs::set_permissions(dir.join("swath"), PermissionsExt::from_mode(0o755)).unwrap();
+    let output = run();
+    assert_eq!(output.status.code(), Some(7));
+    assert_eq!(said(&output.stdout), "<refly><a bag><--planner><beam><--help><-x><-1>");
+    assert_eq!(said(&output.stderr), "swath-bag refly runs `swath refly`\n");
 }

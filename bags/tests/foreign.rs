@@ -78,7 +78,7 @@ fn copy(name: &str, temp: &Path) -> PathBuf {
 }
 
 fn swath_bag(args: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_swath-bag-core")).args(args).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_swath-bag")).args(args).output().unwrap()
 }
 
 #[test]

@@ -262,7 +262,7 @@ fn keys_pause_and_step() {
     unlockpt(&terminal).unwrap();
     let name = ptsname(&terminal, Vec::new()).unwrap();
     let slave = File::options().read(true).write(true).open(name.to_str().unwrap()).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
     command.args(["play", "bag", "-p", "--topics", STATES, "-r", "0"]).stdin(Stdio::from(slave));
     let player = Program::spawn(command, 38, temp.path());
     let states = states(&node, STATES);
@@ -358,7 +358,7 @@ fn a_damaged_file_is_passed_over_and_told() {
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let left = Bag::open(&temp.path().join("bag")).unwrap().message_count();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
     command.current_dir(temp.path()).env("ROS_DOMAIN_ID", "45").args(["play", "bag", "-r", "0", "--delay", "0"]);
     let output = command.output().unwrap();
     let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
@@ -380,7 +380,7 @@ fn what_cannot_be_played_is_told() {
             "error: --qos-profile-overrides-path: the bag has no topic /no\n",
         ),
     ] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
         command.current_dir(temp.path()).env("ROS_DOMAIN_ID", "38").args(["play", "bag"]).args(words);
         let output = command.output().unwrap();
         assert_eq!(output.status.code(), Some(1));

@@ -285,7 +285,7 @@ fn a_full_disk_ends_recording_with_an_alarm_and_a_readable_bag() {
     // A limit on the size of files stands for a full disk: blocks of 1024 bytes.
     let script = "trap '' XFSZ; ulimit -f 60; exec \"$0\" record -o bag --compression none --chunk-size 4096 /swath/spacecraft/state";
     let mut command = Command::new("bash");
-    command.args(["-c", script, env!("CARGO_BIN_EXE_swath-bag-core")]);
+    command.args(["-c", script, env!("CARGO_BIN_EXE_swath-bag")]);
     let recorder = Program::spawn(command, 32, temp.path());
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     wait_until("the recorder listens", || states.matched() > 0 && diagnostics.matched() > 0);

@@ -1,4 +1,4 @@
-//! The commands of `swath-bag` that know missions, on the recorded mission of `bags/samples`, and one over DDS.
+//! What `swath` makes of recorded missions, on the one of `bags/samples`, and one over DDS.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 mod common;
@@ -26,22 +26,35 @@ fn swath_bag(words: &[&str]) -> Command {
     command
 }
 
+fn swath(words: &[&str]) -> Command {
+    common::swath("100", words)
+}
+
 fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
 #[test]
 fn every_command_has_an_example() {
-    let help = common::succeed(&mut swath_bag(&["--help"]));
-    let commands = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
-    let names: Vec<&str> = commands.lines().map(|line| line.split_whitespace().next().unwrap()).collect();
-    for name in ["record", "play", "info", "cat", "validate", "filter", "merge", "recover", "refly", "report", "export"]
-    {
-        assert!(names.contains(&name), "{names:?}");
-        let help = common::succeed(&mut swath_bag(&[name, "--help"]));
+    for name in ["refly", "report", "export"] {
+        let help = common::succeed(&mut swath(&[name, "--help"]));
         let example = help.split("Example").nth(1).unwrap();
-        assert!(example.contains(&format!("\n  swath-bag {name} ")), "{help}");
+        assert!(example.contains(&format!("\n  swath {name} ")), "{help}");
     }
+}
+
+#[test]
+fn the_old_spelling_runs_the_same_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |command: &mut Command| {
+        let output = common::run(command);
+        (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let sample = sample();
+    let words = ["export", text(&sample), "--format", "czml", "-o", text(folder.path())];
+    let (new, old) = (said(&mut swath(&words)), said(&mut swath_bag(&words)));
+    assert_eq!((old.0, &old.1), (new.0, &new.1));
+    assert_eq!(old.2, format!("swath-bag export runs `swath export`\n{}", new.2));
 }
 
 #[test]
@@ -77,7 +90,7 @@ fn the_sample_goes_through_filter_merge_and_recover() {
     common::succeed(&mut swath_bag(&["merge", &out("a"), &out("b"), "-o", &out("whole")]));
     fs::remove_file(folder.path().join("whole/metadata.yaml")).unwrap();
     common::succeed(&mut swath_bag(&["recover", &out("whole"), "-o", &out("saved")]));
-    let refly = common::succeed(&mut swath_bag(&["refly", &out("saved")]));
+    let refly = common::succeed(&mut swath(&["refly", &out("saved")]));
     assert!(refly.contains("are the same, byte by byte"), "{refly}");
 }
 
@@ -85,7 +98,7 @@ fn the_sample_goes_through_filter_merge_and_recover() {
 fn the_same_planner_flies_the_recorded_mission_again_byte_by_byte() {
     let folder = tempfile::tempdir().unwrap();
     let tasks = folder.path().join("tasks.jsonl");
-    let said = common::succeed(&mut swath_bag(&["refly", text(&sample()), "--tasks", text(&tasks)]));
+    let said = common::succeed(&mut swath(&["refly", text(&sample()), "--tasks", text(&tasks)]));
     let recorded = Recorded::open(&sample(), NAMESPACE).unwrap();
     assert!(recorded.complete && recorded.tasks.len() > 10);
     assert!(said.contains(&format!("all {} tasks are the same, byte by byte", recorded.tasks.len())), "{said}");
@@ -98,14 +111,14 @@ fn another_planner_is_compared_decision_by_decision() {
     let words = ["refly", text(&sample()), "--planner", "heuristic:90"].map(str::to_owned);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let comparison: Value =
-        serde_json::from_str(&common::succeed(&mut swath_bag(&[&words[..], &["--json"]].concat()))).unwrap();
+        serde_json::from_str(&common::succeed(&mut swath(&[&words[..], &["--json"]].concat()))).unwrap();
     assert_eq!(comparison["identical"], false);
     assert_eq!(comparison["first_difference"], 0);
     let first = &comparison["decisions"][0];
     assert_eq!(first["same_candidates"], true, "both begin with the same strips");
     assert_eq!(first["reflown"]["t_pre_ticks"], 180);
     assert_ne!(comparison["recorded"]["reward"], comparison["reflown"]["reward"]);
-    let said = common::succeed(&mut swath_bag(&words));
+    let said = common::succeed(&mut swath(&words));
     assert!(said.contains("first difference: decision 0, among the same strips\n"), "{said}");
 }
 
@@ -130,16 +143,16 @@ fn a_flight_that_went_another_way_than_its_manifest_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let changed = folder.path().join("changed");
     copy_with_manifest(&changed, |mission| Some(mission.replacen("k1 = 0.25", "k1 = 0.24", 1)));
-    let output: Output = common::run(&mut swath_bag(&["refly", text(&changed)]));
+    let output: Output = common::run(&mut swath(&["refly", text(&changed)]));
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("first difference: decision 0"), "{said}");
 
     let none = folder.path().join("none");
     copy_with_manifest(&none, |_| None);
-    let said = common::fail(&mut swath_bag(&["refly", text(&none)]));
+    let said = common::fail(&mut swath(&["refly", text(&none)]));
     assert!(said.contains("holds no mission: no metadata record swath_manifest"), "{said}");
-    let said = common::fail(&mut swath_bag(&["report", text(&sample()), "--namespace", "/other"]));
+    let said = common::fail(&mut swath(&["report", text(&sample()), "--namespace", "/other"]));
     assert!(said.contains("the bag has no topic /other/guidance/decision_point"), "{said}");
 }
 
@@ -186,7 +199,7 @@ fn what_operators_did_in_flight_is_flown_again() {
         assert!(found, "nothing was {what}");
     }
     let again = folder.path().join("again.jsonl");
-    common::succeed(&mut swath_bag(&["refly", text(&bag), "--tasks", text(&again)]));
+    common::succeed(&mut swath(&["refly", text(&bag), "--tasks", text(&again)]));
     assert_eq!(fs::read_to_string(again).unwrap(), fs::read_to_string(tasks).unwrap());
 }
 
@@ -194,7 +207,7 @@ fn what_operators_did_in_flight_is_flown_again() {
 fn exports_are_read_by_others() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("export");
-    common::succeed(&mut swath_bag(&["export", text(&sample()), "-o", text(&out), "--step", "10"]));
+    common::succeed(&mut swath(&["export", text(&sample()), "-o", text(&out), "--step", "10"]));
     let read = common::succeed(&mut common::python("read_export.py", text(&out)));
     let read: Value = serde_json::from_str(&read).unwrap();
     let recorded = Recorded::open(&sample(), NAMESPACE).unwrap();
@@ -213,7 +226,7 @@ fn exports_are_read_by_others() {
     assert!(read["largest_attitude_difference"].as_f64().unwrap() < 1e-9, "{read}");
 
     let only = folder.path().join("only");
-    common::succeed(&mut swath_bag(&["export", text(&sample()), "-o", text(&only), "--format", "czml"]));
+    common::succeed(&mut swath(&["export", text(&sample()), "-o", text(&only), "--format", "czml"]));
     let files: Vec<_> = fs::read_dir(&only).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(files, ["mission.czml"]);
 }
@@ -260,7 +273,7 @@ fn dom(page: &Path) -> String {
 fn the_report_shows_what_was_flown() {
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("report.html");
-    common::succeed(&mut swath_bag(&["report", text(&sample()), "-o", text(&report)]));
+    common::succeed(&mut swath(&["report", text(&sample()), "-o", text(&report)]));
     let page = fs::read_to_string(&report).unwrap();
     for outside in ["src=", "href=", "url(", "@import", "<script"] {
         assert!(!page.contains(outside), "the page asks for something outside: {outside}");

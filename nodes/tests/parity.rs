@@ -66,7 +66,7 @@ fn satellites_that_differ_from_their_model_and_planners_that_wait_are_the_same_t
             assert_eq!(over_dds, in_process, "{name}, planner {planner}");
             assert!(in_process.lines().count() > 10);
             let bag = out("dds").join("bag");
-            common::succeed(common::command("swath-bag", "0").arg("refly").arg(bag));
+            common::succeed(common::swath("0", &["refly"]).arg(bag));
         }
     }
 }

@@ -85,10 +85,11 @@ fn test(root: &Path, args: &[OsString]) -> Result<()> {
     process::run(&mut cargo)
 }
 
-/// Builds all nodes, then becomes `swath launch`.
+/// Builds all nodes and the recorder, then becomes `swath launch`.
 fn mission(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, false)?;
-    process::run(process::cargo(root, "build").args(["--quiet", "--release", "--package", "swath-nodes", "--bins"]))?;
+    let packages = ["--package", "swath-nodes", "--package", "swath-bags"];
+    process::run(process::cargo(root, "build").args(["--quiet", "--release"]).args(packages).arg("--bins"))?;
     let mut cargo = process::cargo(root, "run");
     cargo.args(["--quiet", "--release", "--package", "swath-nodes"]);
     cargo.args(["--bin", "swath", "--", "launch", MISSION]).args(args);

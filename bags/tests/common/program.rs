@@ -56,7 +56,7 @@ pub struct Program {
 impl Program {
     /// Starts it and waits until it is ready.
     pub fn start(domain: u16, dir: &Path, words: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag-core"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
         command.args(words).stdin(Stdio::null());
         Self::spawn(command, domain, dir)
     }

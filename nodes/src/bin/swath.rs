@@ -2,7 +2,9 @@
 
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::{Parser, Subcommand};
+use swath_ground::debrief::{export, refly, report};
 use swath_ground::{launch, operate};
 use swath_node::node;
 use swath_nodes::POLICIES;
@@ -23,19 +25,30 @@ enum Command {
     Strips(operate::StripsArgs),
     /// Say what the planner may do by itself, and decide on what it proposes.
     Planner(operate::PlannerArgs),
+    /// Fly a recorded mission again, with the same or another planner, and compare.
+    Refly(refly::ReflyArgs),
+    /// Tell of a recorded mission in one page: map, timeline, plots, decisions.
+    Report(report::ReportArgs),
+    /// Write tasks, states and decisions as tables, strips and ground track as GeoJSON, orbit and attitude as CZML.
+    Export(export::ExportArgs),
     /// Print the node graph as a Mermaid diagram and as a table.
     Graph,
 }
 
-#[expect(clippy::print_stdout, reason = "the diagram is this command's result")]
 fn main() -> ExitCode {
-    node::exit_code(match Args::parse().command {
-        Command::Launch(args) => launch::run(&args, &POLICIES),
-        Command::Strips(args) => operate::run_strips(&args),
-        Command::Planner(args) => operate::run_planner(&args),
-        Command::Graph => {
-            print!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table());
-            Ok(())
-        }
-    })
+    run(Args::parse().command).unwrap_or_else(|error| node::exit_code(Err(error)))
+}
+
+#[expect(clippy::print_stdout, reason = "the diagram is one command's result")]
+fn run(command: Command) -> Result<ExitCode> {
+    match command {
+        Command::Launch(args) => launch::run(&args, &POLICIES)?,
+        Command::Strips(args) => operate::run_strips(&args)?,
+        Command::Planner(args) => operate::run_planner(&args)?,
+        Command::Refly(args) => return args.run(&POLICIES),
+        Command::Report(args) => return args.run(),
+        Command::Export(args) => return args.run(),
+        Command::Graph => print!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table()),
+    }
+    Ok(ExitCode::SUCCESS)
 }

@@ -11,7 +11,7 @@ const SAMPLE: &str = "<repository>/bags/samples/mission";
 
 /// A re-flight: what is compared in clear, and the digests of all decisions and of the tasks.
 pub fn refly(place: &Place, bag: &str, options: &str) -> String {
-    let line = format!("swath-bag refly {bag} {options}--tasks tasks.jsonl --json");
+    let line = format!("swath refly {bag} {options}--tasks tasks.jsonl --json");
     let mut said: Value = serde_json::from_str(&place.succeed(&line)).unwrap();
     let decisions = said.as_object_mut().unwrap().remove("decisions").unwrap();
     let tasks = place.read("tasks.jsonl");
@@ -26,7 +26,7 @@ pub fn refly(place: &Place, bag: &str, options: &str) -> String {
 
 /// An export: each file's length and digest. Parquet files also tell the version of the library that wrote them.
 pub fn export(place: &Place, bag: &str, options: &str) -> String {
-    let line = format!("swath-bag export {bag} -o export{options}");
+    let line = format!("swath export {bag} -o export{options}");
     place.succeed(&line);
     let mut names: Vec<_> =
         std::fs::read_dir(place.path("export")).unwrap().map(|it| it.unwrap().file_name()).collect();
@@ -52,7 +52,7 @@ pub fn export(place: &Place, bag: &str, options: &str) -> String {
 
 /// A report: its facts and tables in clear, and how many shapes each figure has.
 pub fn report(place: &Place, bag: &str) -> String {
-    let line = format!("swath-bag report {bag} -o report.html");
+    let line = format!("swath report {bag} -o report.html");
     place.succeed(&line);
     let page = place.read("report.html");
     let mut text = format!("$ {line}\n");

@@ -1,4 +1,4 @@
-"""Reads what `swath-bag export` wrote with readers from outside, compares the files with each other, and prints JSON."""
+"""Reads what `swath export` wrote with readers from outside, compares the files with each other, and prints JSON."""
 
 import json
 import math

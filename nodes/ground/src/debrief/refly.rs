@@ -1,4 +1,4 @@
-//! `swath-bag refly`: a recorded mission flown again in process, beside what was recorded.
+//! `swath refly`: a recorded mission flown again in process, beside what was recorded.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Write as _;
@@ -23,8 +23,8 @@ use swath_mission::outcome::TaskLine;
 /// Arguments of `refly`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  swath-bag refly bags/samples/mission
-  swath-bag refly bags/samples/mission --planner heuristic:90
+  swath refly bags/samples/mission
+  swath refly bags/samples/mission --planner heuristic:90
 
 Takes configuration, seed and requests with their arrival times from the bag. With the recording's own planner
 the tasks of a mission that was flown in lockstep are the recorded ones byte by byte; the exit code is 1 when

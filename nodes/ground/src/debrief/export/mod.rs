@@ -1,4 +1,4 @@
-//! `swath-bag export`: a recorded mission as tables, GeoJSON and CZML.
+//! `swath export`: a recorded mission as tables, GeoJSON and CZML.
 
 mod czml;
 pub mod geo;
@@ -21,7 +21,7 @@ use super::recorded::{NAMESPACE, Recorded};
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  swath-bag export bags/samples/mission -o out/export --format csv geojson
+  swath export bags/samples/mission -o out/export --format csv geojson
 
 Writes tasks, states and decisions as .csv and .parquet, strips.geojson and ground_track.geojson, and
 mission.czml with orbit and attitude for Cesium.")]

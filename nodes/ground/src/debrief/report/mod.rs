@@ -1,4 +1,4 @@
-//! `swath-bag report`: a recorded mission as one page that needs no network.
+//! `swath report`: a recorded mission as one page that needs no network.
 
 mod figures;
 mod page;
@@ -16,7 +16,7 @@ use super::recorded::{NAMESPACE, Recorded};
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  swath-bag report bags/samples/mission -o out/report.html
+  swath report bags/samples/mission -o out/report.html
 
 The page holds the ground track and the strips on a map, the tasks over time, attitude error, wheel speeds and
 torques, reward, request states, and each decision with its candidates.")]
