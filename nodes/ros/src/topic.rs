@@ -78,6 +78,10 @@ pub struct Subscription<M> {
     message: PhantomData<fn() -> M>,
 }
 
+/// How long a writer may pause while it sends what it holds to a late reader: it sends 256 samples, and the next ones
+/// after its next heartbeat, every 100 ms.
+const LATCHED_PAUSE: Duration = Duration::from_millis(300);
+
 /// Messages of unknown writers that are kept.
 const PARKED: usize = 64;
 
@@ -186,6 +190,24 @@ impl<M: RosMessage> Subscription<M> {
             }
             signal.wait(remaining);
         }
+    }
+
+    /// The newest message of a latched topic, for those who want to know how things stand; nothing when none comes in
+    /// that time.
+    ///
+    /// A reader that comes late is sent what the writer still holds, the oldest first: the newest one is there when no
+    /// more comes for a while.
+    ///
+    /// # Errors
+    /// As [`Self::take`].
+    pub fn newest(&self, signal: &Signal, timeout: Duration) -> Result<Option<M>, RosError> {
+        let mut newest = self.wait(signal, timeout)?;
+        if newest.is_some() {
+            while let Some(newer) = self.wait(signal, LATCHED_PAUSE)? {
+                newest = Some(newer);
+            }
+        }
+        Ok(newest)
     }
 
     /// From now on this subscription raises that signal and no longer the node's.
