@@ -78,9 +78,11 @@ pub struct Subscription<M> {
     message: PhantomData<fn() -> M>,
 }
 
-/// How long a writer may pause while it sends what it holds to a late reader: it sends 256 samples, and the next ones
-/// after its next heartbeat, every 100 ms.
-const LATCHED_PAUSE: Duration = Duration::from_millis(300);
+/// A late reader is sent so many of the samples that a writer holds; the next ones after the next heartbeat.
+const ROUND: usize = 256;
+
+/// How long the samples of a round may be apart, and how long the next round may take to begin.
+const PAUSES: [Duration; 2] = [Duration::from_millis(150), Duration::from_millis(1200)];
 
 /// Messages of unknown writers that are kept.
 const PARKED: usize = 64;
@@ -201,11 +203,11 @@ impl<M: RosMessage> Subscription<M> {
     /// # Errors
     /// As [`Self::take`].
     pub fn newest(&self, signal: &Signal, timeout: Duration) -> Result<Option<M>, RosError> {
-        let mut newest = self.wait(signal, timeout)?;
-        if newest.is_some() {
-            while let Some(newer) = self.wait(signal, LATCHED_PAUSE)? {
-                newest = Some(newer);
-            }
+        let (mut newest, mut taken, mut pause) = (None, 0, timeout);
+        while let Some(newer) = self.wait(signal, pause)? {
+            newest = Some(newer);
+            taken += 1;
+            pause = PAUSES[usize::from(taken >= ROUND)];
         }
         Ok(newest)
     }
