@@ -78,6 +78,12 @@ pub struct Subscription<M> {
     message: PhantomData<fn() -> M>,
 }
 
+/// A late reader is sent so many of the samples that a writer holds; the next ones after the next heartbeat.
+const ROUND: usize = 256;
+
+/// How long the samples of a round may be apart, and how long the next round may take to begin.
+const PAUSES: [Duration; 2] = [Duration::from_millis(150), Duration::from_millis(1200)];
+
 /// Messages of unknown writers that are kept.
 const PARKED: usize = 64;
 
@@ -186,6 +192,24 @@ impl<M: RosMessage> Subscription<M> {
             }
             signal.wait(remaining);
         }
+    }
+
+    /// The newest message of a latched topic, for those who want to know how things stand; nothing when none comes in
+    /// that time.
+    ///
+    /// A reader that comes late is sent what the writer still holds, the oldest first: the newest one is there when no
+    /// more comes for a while.
+    ///
+    /// # Errors
+    /// As [`Self::take`].
+    pub fn newest(&self, signal: &Signal, timeout: Duration) -> Result<Option<M>, RosError> {
+        let (mut newest, mut taken, mut pause) = (None, 0, timeout);
+        while let Some(newer) = self.wait(signal, pause)? {
+            newest = Some(newer);
+            taken += 1;
+            pause = PAUSES[usize::from(taken >= ROUND)];
+        }
+        Ok(newest)
     }
 
     /// From now on this subscription raises that signal and no longer the node's.

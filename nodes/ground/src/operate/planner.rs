@@ -86,7 +86,7 @@ pub fn run(args: &PlannerArgs) -> Result<()> {
         PlannerCommand::Reject { proposal } => review(&operator, args, *proposal, false)?,
         PlannerCommand::Status => {
             let statuses = operator.node.subscription(&graph::PLANNER_STATUS)?;
-            let status = statuses.wait(operator.node.signal(), TIMEOUT)?;
+            let status = statuses.newest(operator.node.signal(), TIMEOUT)?;
             let status = status.context("no planner is flying in this domain")?;
             if args.json {
                 println!("{}", status_json(&status));

@@ -61,6 +61,21 @@ fn a_late_reader_gets_what_is_latched() {
     assert_eq!(summary, RequestSummary { tick: 3, ..Default::default() });
 }
 
+#[test]
+fn who_asks_how_things_stand_is_told_the_newest() {
+    let trial = Trial::new(26);
+    let manager = trial.start(graph::REQUEST_MANAGER, "").unwrap();
+    let summaries = manager.publisher(&graph::REQUEST_SUMMARY).unwrap();
+    for tick in 1..=500 {
+        summaries.publish(&RequestSummary { tick, ..Default::default() }).unwrap();
+    }
+    let late = trial.start(graph::OPERATOR, "").unwrap();
+    let received = late.subscription(&graph::REQUEST_SUMMARY).unwrap();
+    assert_eq!(received.newest(late.signal(), PATIENCE).unwrap().unwrap().tick, 500);
+    let nothing = late.subscription(&graph::PLANNER_STATUS).unwrap();
+    assert_eq!(nothing.newest(late.signal(), Duration::from_millis(50)).unwrap(), None);
+}
+
 /// A reader that is in no hurry still gets what a node said before it ended.
 #[test]
 fn the_last_words_of_a_node_are_heard() {
