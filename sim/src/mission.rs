@@ -86,6 +86,12 @@ impl<K: RequestKeeper> Mission<K> {
         &self.model
     }
 
+    /// The satellite in flight.
+    #[must_use]
+    pub fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
     /// Whoever keeps the requests.
     #[must_use]
     pub fn keeper(&self) -> &K {

@@ -105,6 +105,10 @@ impl Planner for PolicyLookahead {
         format!("{}+lookahead", self.learned.name())
     }
 
+    fn minds_wheels(&self) -> bool {
+        true
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {
         self.judgement = None;
         let allowance = self.experience.learn(context);

@@ -121,6 +121,11 @@ pub trait Planner {
     /// When no usable decision could be made.
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError>;
 
+    /// Whether it plans with the wheels that the situation says are left.
+    fn minds_wheels(&self) -> bool {
+        false
+    }
+
     /// Why it decided as it last did; nothing from a planner that does not weigh candidates.
     fn rationale(&self) -> Option<Rationale> {
         None

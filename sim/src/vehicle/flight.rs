@@ -8,6 +8,8 @@ use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::executive::{Executive, Sight};
 use crate::vehicle::guidance::GuidanceTick;
+use crate::vehicle::health;
+use crate::vehicle::health::Health;
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;
 
@@ -20,12 +22,14 @@ pub struct Situation {
     pub r_BN_N: Vector3<f64>,
     /// Velocity in N [m/s].
     pub v_BN_N: Vector3<f64>,
-    /// Attitude, rate and wheel speeds as they are measured.
+    /// Attitude, rate and wheel speeds as they are best known.
     pub body: BodyState,
     /// The servo's rate-error integral [rad].
     pub servo_integral: Vector3<f64>,
     /// Torque commanded one tick ago, which acts until the next tick [N m].
     pub torque_pending: Vector3<f64>,
+    /// Share of its torque limit that each wheel is known to give; 1 for a sound one.
+    pub wheels: Vector3<f64>,
 }
 
 /// Spacecraft and executive in one process, with the latency of one tick between them.
@@ -44,11 +48,18 @@ impl Flight {
         Self { spacecraft, executive: Executive::new(model), torque_pending: Vector3::zeros() }
     }
 
+    /// Gives it an executive that watches wheels and sensors; `noisy` is whether the sensors are known to be.
+    pub fn watch(&mut self, model: &Model, noisy: bool) {
+        self.executive = Executive::watching(model, noisy);
+    }
+
     /// A flight in a planner's head: from what is known of the satellite, by what the model says of it.
     #[must_use]
     pub fn predicted(model: &Model, situation: &Situation) -> Self {
         let orbit = Orbit::through(&situation.r_BN_N, &situation.v_BN_N, situation.now, model.period);
         let mut flight = Self::new(model, Spacecraft::on_orbit(model, orbit, situation.body, situation.now));
+        flight.spacecraft.refit(model.plant.limited(&situation.wheels));
+        flight.executive.guidance.wheel_lost = health::lost(&situation.wheels);
         flight.rewind(situation);
         flight
     }
@@ -70,14 +81,22 @@ impl Flight {
     /// What a planner may know now.
     pub fn situation(&mut self) -> Situation {
         let now = self.now();
+        let body = self.executive.look(&sight(&mut self.spacecraft));
         Situation {
             now,
             r_BN_N: self.spacecraft.orbit.position(now),
             v_BN_N: self.spacecraft.orbit.velocity(now),
-            body: *self.spacecraft.measured(),
+            body,
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
+            wheels: self.executive.health().wheels,
         }
+    }
+
+    /// What is known of wheels and sensors.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.executive.health()
     }
 
     /// Takes up a task now.

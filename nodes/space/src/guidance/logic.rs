@@ -9,6 +9,7 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::guidance::GuidanceTick;
+use swath_sim::vehicle::health::Health;
 use swath_sim::vehicle::spacecraft::StateSample;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
@@ -167,6 +168,19 @@ impl GuidanceLogic {
         self
     }
 
+    /// From now on it watches wheels and sensors; `noisy` is whether the sensors are known to be.
+    #[must_use]
+    pub fn watching(mut self, noisy: bool) -> Self {
+        self.executive = Executive::watching(&self.model, noisy);
+        self
+    }
+
+    /// What is known of wheels and sensors.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.executive.health()
+    }
+
     /// Takes a state. A state seen before brings its command again, so that a lost sample stops nothing.
     pub fn on_state(&mut self, state: StateSample) -> Vec<Effect> {
         if let Some(latest) = &self.latest
@@ -245,20 +259,22 @@ impl GuidanceLogic {
         if self.executive.task().is_some() {
             return vec![self.fly(&state)];
         }
+        let body = self.executive.look(&sight(&state));
         let situation = Situation {
             now: state.tick,
             r_BN_N: state.r_BN_N,
             v_BN_N: state.v_BN_N,
-            body: state.body,
+            body,
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
+            wheels: self.executive.health().wheels,
         };
         if !over {
             self.waiting.push_back(state);
         }
         vec![Effect::Decide(Box::new(DecisionPoint {
             task: self.task,
-            state,
+            state: StateSample { body, ..state },
             situation,
             mission_over: over,
             finished,

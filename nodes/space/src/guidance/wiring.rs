@@ -79,7 +79,9 @@ impl GuidanceNode {
         let hold = period.ticks_ceil(mission.hold_s);
         let delay = period.ticks_ceil(mission.plant.planning_delay_s);
         Ok(Self {
-            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold).with_planning_delay(delay),
+            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold)
+                .with_planning_delay(delay)
+                .watching(mission.plant.noisy()),
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
             truths: match mission.plant.noisy() {
                 true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),

@@ -79,6 +79,10 @@ impl Planner for Beam {
         "beam".to_owned()
     }
 
+    fn minds_wheels(&self) -> bool {
+        true
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let allowance = self.experience.learn(context);
         let best = self.search.sequences(context, &allowance).into_iter().next();

@@ -11,6 +11,7 @@ pub use search::{Found, Search};
 
 use super::{Decision, DecisionContext, Planner, PlannerError, wait};
 use crate::requests::catalogue::Candidate;
+use crate::vehicle::health::lost;
 
 /// Lookahead planner.
 ///
@@ -32,6 +33,10 @@ impl Lookahead {
 impl Planner for Lookahead {
     fn name(&self) -> String {
         self.experience.margin().map_or_else(|| "lookahead".to_owned(), |ticks| format!("lookahead:{ticks}"))
+    }
+
+    fn minds_wheels(&self) -> bool {
+        true
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
@@ -78,11 +83,16 @@ fn best(context: &DecisionContext<'_>, allowance: &Allowance) -> Decision {
     }
 }
 
+/// Shortest wait when nothing can be imaged with a wheel lost [s].
+const REST_S: f64 = 10.0;
+
 /// Nothing can be imaged now: waits until a window comes within reach.
 #[must_use]
 pub fn wait_for_a_window(context: &DecisionContext<'_>) -> Decision {
     let latest = context.situation.now.after(context.model.t_pre_max());
-    wait(context, context.candidates.iter().map(|c| c.window.open.since(latest).max(1)))
+    // With a wheel lost, strips in reach may be out of what can be pointed: the satellite comes to rest meanwhile.
+    let least = if lost(&context.situation.wheels) { context.model.period.ticks_ceil(REST_S).max(1) } else { 1 };
+    wait(context, context.candidates.iter().map(|c| c.window.open.since(latest).max(i64::from(least))))
 }
 
 /// Priority per tick.
