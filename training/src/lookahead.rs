@@ -105,6 +105,10 @@ impl Planner for PolicyLookahead {
         format!("{}+lookahead", self.learned.name())
     }
 
+    fn forget(&mut self) {
+        self.experience.forget();
+    }
+
     fn minds_wheels(&self) -> bool {
         true
     }

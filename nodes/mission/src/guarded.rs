@@ -1,7 +1,10 @@
 //! Planners as missions fly them: whatever happens to one, somebody decides.
 
 use anyhow::Result;
-use swath_sim::planner::{Decision, DecisionContext, Heuristic, Planner, PlannerError, PlannerSpec, Rationale};
+use swath_sim::planner::{
+    Decision, DecisionContext, Heuristic, Lookahead, Planner, PlannerError, PlannerSpec, Rationale,
+};
+use swath_sim::vehicle::health::lost;
 
 /// Learned policies as a program links them. Programs hand this in, so that those which do not plan are not linked with
 /// what policies need.
@@ -18,11 +21,18 @@ pub struct Policies {
 /// Transition of the heuristic that takes over from a planner that fails [s].
 const FALLBACK_T_PRE_S: f64 = 90.0;
 
+/// Why a planner that does not fly its slews in its head does not decide any more.
+const WHEEL_LOST: &str = "a wheel is lost, and the planner does not know what the others can point at";
+
 /// A planner with the heuristic behind it, which decides when the planner cannot.
 pub struct GuardedPlanner {
     /// None when it could not be made.
     planner: Option<Box<dyn Planner + Send>>,
     fallback: Heuristic,
+    /// Decides once a wheel is lost, where the planner does not know what is left to point with.
+    degraded: Lookahead,
+    /// Whether it made the last decision.
+    degraded_decided: bool,
     /// Why the planner itself did not make the last decision.
     fault: Option<String>,
     /// Why it could not be made.
@@ -38,6 +48,8 @@ impl GuardedPlanner {
             Err(error) => Self {
                 planner: None,
                 fallback: Heuristic { t_pre_s: FALLBACK_T_PRE_S },
+                degraded: Lookahead::default(),
+                degraded_decided: false,
                 fault: None,
                 missing: Some(format!("{error:#}")),
             },
@@ -48,7 +60,8 @@ impl GuardedPlanner {
     #[must_use]
     pub fn new(planner: Box<dyn Planner + Send>) -> Self {
         let fallback = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
-        Self { planner: Some(planner), fallback, fault: None, missing: None }
+        let degraded = Lookahead::default();
+        Self { planner: Some(planner), fallback, degraded, degraded_decided: false, fault: None, missing: None }
     }
 
     /// Why there is no planner but the heuristic.
@@ -57,7 +70,7 @@ impl GuardedPlanner {
         self.missing.as_deref()
     }
 
-    /// Why the heuristic made the last decision in the planner's place.
+    /// Why another one made the last decision in the planner's place.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
@@ -73,17 +86,39 @@ fn usable(planner: &mut dyn Planner, context: &DecisionContext<'_>) -> Result<De
 impl Planner for GuardedPlanner {
     /// Name of the planner that made the last decision, or will make the first.
     fn name(&self) -> String {
+        if self.degraded_decided {
+            return self.degraded.name();
+        }
         let own = self.planner.as_ref().filter(|_| self.fault.is_none());
         own.map_or_else(|| self.fallback.name(), |planner| planner.name())
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
-        let Some(planner) = &mut self.planner else { return usable(&mut self.fallback, context) };
         self.fault = None;
+        let minds = self.planner.as_ref().is_some_and(|planner| planner.minds_wheels());
+        self.degraded_decided = lost(&context.situation.wheels) && !minds;
+        if self.degraded_decided {
+            self.fault = Some(WHEEL_LOST.to_owned());
+            return usable(&mut self.degraded, context);
+        }
+        let Some(planner) = &mut self.planner else { return usable(&mut self.fallback, context) };
         usable(planner.as_mut(), context).or_else(|error| {
             self.fault = Some(error.to_string());
             usable(&mut self.fallback, context)
         })
+    }
+
+    fn forget(&mut self) {
+        self.planner.iter_mut().for_each(|planner| planner.forget());
+        self.degraded.forget();
+    }
+
+    fn replaced(&self) -> Option<&str> {
+        self.fault().or(self.missing())
+    }
+
+    fn minds_wheels(&self) -> bool {
+        true
     }
 
     fn rationale(&self) -> Option<Rationale> {

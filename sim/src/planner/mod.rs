@@ -121,6 +121,14 @@ pub trait Planner {
     /// When no usable decision could be made.
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError>;
 
+    /// Forgets what it has learned from the tasks before, as one that is made anew.
+    fn forget(&mut self) {}
+
+    /// Why another planner made the last decision in its place.
+    fn replaced(&self) -> Option<&str> {
+        None
+    }
+
     /// Whether it plans with the wheels that the situation says are left.
     fn minds_wheels(&self) -> bool {
         false

@@ -61,6 +61,11 @@ impl Executive {
         self.watch.as_ref().map(|watch| *watch.health()).unwrap_or_default()
     }
 
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.watch.as_mut().map(|watch| watch.take_changes()).unwrap_or_default()
+    }
+
     /// Attitude, rate and wheel speeds as they are best known.
     #[inline]
     pub fn look(&mut self, sight: &Sight<'_>) -> BodyState {

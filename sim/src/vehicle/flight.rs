@@ -124,6 +124,44 @@ impl Flight {
         self.executive.finish(&sight_then).unwrap_or_else(none)
     }
 
+    /// Flies task `number` until guidance is lost with all that it knew, before it sees the state at `lost`; a fresh one,
+    /// `executive`, is there at `back`, a tick later at least. Meanwhile the wheels hold no torque. The task counts as
+    /// interrupted, and nothing is known of its images.
+    pub fn fly_lost(
+        &mut self,
+        number: u64,
+        task: Task,
+        delay: u32,
+        lost: Tick,
+        back: Tick,
+        executive: Executive,
+    ) -> TaskRecord {
+        let start = self.now().after(delay);
+        self.executive.begin(number, task, delay, &sight(&mut self.spacecraft));
+        while self.now() < lost {
+            self.tick();
+        }
+        self.without_guidance(back, executive);
+        TaskRecord::new(number, &task, start.min(lost), lost, TaskOutcome::NOT_BEGUN)
+    }
+
+    /// Flies without guidance until `back`, a tick at least; `executive` takes over then.
+    pub fn without_guidance(&mut self, back: Tick, executive: Executive) {
+        self.executive = executive;
+        loop {
+            self.spacecraft.advance(&self.torque_pending);
+            self.torque_pending = Vector3::zeros();
+            if self.now() >= back {
+                return;
+            }
+        }
+    }
+
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.executive.take_changes()
+    }
+
     /// One closed-loop tick: the command computed from this tick's state waits while the previous one acts.
     #[inline]
     pub fn tick(&mut self) -> GuidanceTick {

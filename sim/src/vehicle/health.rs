@@ -32,6 +32,17 @@ pub struct Health {
 }
 
 impl Health {
+    /// What of it is worth telling when it changes.
+    fn signs(&self) -> (Vector3<f64>, bool, bool) {
+        (self.wheels, self.tracker_out, self.biased())
+    }
+
+    /// Whether the gyro counts as biased.
+    #[must_use]
+    pub fn biased(&self) -> bool {
+        self.gyro_bias != Vector3::zeros()
+    }
+
     /// Whether a wheel is lost.
     #[must_use]
     pub fn wheel_lost(&self) -> bool {
@@ -74,6 +85,8 @@ pub struct Watch {
     judged: [Judged; 3],
     residual: Vector3<f64>,
     compared: u32,
+    /// What came to be known, and when.
+    changes: Vec<(Tick, Health)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -108,6 +121,7 @@ impl Watch {
             judged: [Judged::default(); 3],
             residual: Vector3::zeros(),
             compared: 0,
+            changes: Vec::new(),
         }
     }
 
@@ -115,6 +129,12 @@ impl Watch {
     #[must_use]
     pub fn health(&self) -> &Health {
         &self.health
+    }
+
+    /// What came to be known since the last call, each with its tick; first of all that nothing is known to be wrong.
+    /// The corrections of a biased gyro go on without being told.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        std::mem::take(&mut self.changes)
     }
 
     /// Remembers the torque commanded from the state at a tick [N m].
@@ -128,14 +148,23 @@ impl Watch {
         let last = match self.last {
             Some(last) if last.tick == tick => return last.estimate,
             Some(last) if last.tick.after(1) == tick => last,
-            _ => return self.remember(tick, measured, true, *measured),
+            last => {
+                if last.is_none() {
+                    self.changes.push((tick, self.health));
+                }
+                return self.remember(tick, measured, true, *measured);
+            }
         };
+        let before = self.health;
         self.judge_wheels(&last, measured);
         let omega = (measured.omega_BN_B + last.measured.omega_BN_B) * 0.5;
         let repeated = measured.sigma_BN == last.measured.sigma_BN && omega.amax() * self.dt > MOVED;
         self.health.tracker_out = repeated;
         if !repeated && last.fresh {
             self.compare(&last.measured, measured, &omega);
+        }
+        if self.health.signs() != before.signs() {
+            self.changes.push((tick, self.health));
         }
         let mut estimate = *measured;
         estimate.omega_BN_B -= self.health.gyro_bias;

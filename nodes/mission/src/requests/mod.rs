@@ -7,6 +7,7 @@ pub mod lifecycle;
 pub mod logic;
 pub mod query;
 pub mod refusal;
+pub mod restart;
 mod settle;
 
 #[cfg(test)]

@@ -79,6 +79,10 @@ impl Planner for Beam {
         "beam".to_owned()
     }
 
+    fn forget(&mut self) {
+        self.experience.forget();
+    }
+
     fn minds_wheels(&self) -> bool {
         true
     }

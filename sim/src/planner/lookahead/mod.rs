@@ -35,6 +35,10 @@ impl Planner for Lookahead {
         self.experience.margin().map_or_else(|| "lookahead".to_owned(), |ticks| format!("lookahead:{ticks}"))
     }
 
+    fn forget(&mut self) {
+        self.experience.forget();
+    }
+
     fn minds_wheels(&self) -> bool {
         true
     }

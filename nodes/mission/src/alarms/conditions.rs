@@ -1,0 +1,93 @@
+//! What nodes report of conditions that follow from the mission itself, so that each flight of it reports the same.
+
+use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::vehicle::health::Health;
+
+use super::board::{Board, Key};
+use super::definitions::Severity;
+use crate::faults::grammar::{Failure, Process, What};
+use crate::faults::plan::{FaultPlan, Scheduled};
+
+/// Who tells of what the satellite knows of itself.
+const GUIDANCE: &str = "guidance";
+/// Who tells of lost nodes and messages.
+const LAUNCHER: &str = "launcher";
+
+/// A node says whether something is wrong.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// When.
+    pub tick: Tick,
+    /// Which alarm.
+    pub key: Key,
+    /// Whether something is wrong.
+    pub wrong: bool,
+    /// What.
+    pub text: String,
+}
+
+impl Report {
+    fn new(tick: Tick, node: &str, name: &str, wrong: bool, text: String) -> Self {
+        Self { tick, key: Key::new(node, name), wrong, text }
+    }
+}
+
+/// Reports, in the order of their ticks.
+pub fn report_all(board: &mut Board, mut reports: Vec<Report>) {
+    reports.sort_by_key(|report| report.tick);
+    for Report { tick, key, wrong, text } in reports {
+        board.report(tick, key, Severity::Error, wrong, &text);
+    }
+}
+
+/// What guidance reports of wheels and sensors.
+#[must_use]
+pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
+    let mut reports = Vec::new();
+    for (name, &share) in ["wheel x", "wheel y", "wheel z"].into_iter().zip(&health.wheels) {
+        let text = match share {
+            1.0 => "it gives what is commanded".to_owned(),
+            share if share <= 0.0 => "it gives no torque: only some strips can be pointed at".to_owned(),
+            share => format!("it gives {:.0} % of its torque limit", share * 100.0),
+        };
+        reports.push(Report::new(tick, GUIDANCE, name, share < 1.0, text));
+    }
+    let bias = health.gyro_bias.map(f64::to_degrees);
+    let text = format!("by {:.4}, {:.4} and {:.4} deg/s about x, y and z", bias.x, bias.y, bias.z);
+    reports.push(Report::new(tick, GUIDANCE, "gyro biased", health.biased(), text));
+    let text = if health.tracker_out { "the gyro carries the attitude on" } else { "it has an attitude" };
+    reports.push(Report::new(tick, GUIDANCE, "star tracker out", health.tracker_out, text.to_owned()));
+    reports
+}
+
+/// What is reported of the faults by order that wheels and sensors do not show: when each begins and ends.
+#[must_use]
+pub fn of_plan(plan: &FaultPlan, period: TickPeriod) -> Vec<Report> {
+    let mut reports = Vec::new();
+    for it in plan.scheduled(period) {
+        let Some((node, name, text)) = planned(&it) else { continue };
+        reports.push(Report::new(it.from, node, &name, true, text));
+        let until = if matches!(it.what, What::Process(Process::Guidance, _)) { back(&it) } else { it.until };
+        reports.push(Report::new(until, node, &name, false, "over".to_owned()));
+    }
+    reports.sort_by_key(|report| report.tick);
+    reports
+}
+
+/// Tick at which a fresh guidance is there: it does not see the state at which the one before was lost.
+#[must_use]
+pub fn back(lost: &Scheduled) -> Tick {
+    lost.until.max(lost.from.after(1))
+}
+
+fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
+    let (node, name, text) = match it.what {
+        What::Process(process, Failure::Kill) => (LAUNCHER, format!("{} lost", process.name()), "killed by order"),
+        What::Process(process, Failure::Hang) => (LAUNCHER, format!("{} lost", process.name()), "hangs by order"),
+        What::Drop(_) => (LAUNCHER, "messages lost".to_owned(), "dropped by order"),
+        What::StoreFull => ("request_manager", "store full".to_owned(), "full by order"),
+        What::BagFull => ("recorder", "recorder full".to_owned(), "full by order"),
+        What::Vehicle(_) => return None,
+    };
+    Some((node, name, text.to_owned()))
+}
