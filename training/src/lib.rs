@@ -28,7 +28,7 @@
 //! let folder = tempfile::tempdir()?;
 //! let file = folder.path().join(checkpoint::file_name(&trainer));
 //! checkpoint::save(&trainer, &file)?;
-//! let mut resumed = Trainer::resume(run, &file, Device::Cpu)?;
+//! let mut resumed = checkpoint::resume(run, &file, Device::Cpu)?;
 //! assert_eq!(resumed.advance()?.update, trainer.advance()?.update);
 //! assert!(resumed.is_finished());
 //! # Ok(())
@@ -66,5 +66,6 @@ pub mod strips;
 pub mod tensorboard;
 pub mod toy;
 pub mod trainer;
+pub mod weights;
 
 pub use error::{Result, TrainingError};

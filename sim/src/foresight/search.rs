@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::passes::Passes;
-use super::{Plan, PlannedTask};
+use super::plan::{Plan, PlannedTask};
 use crate::learn::episode::Env;
 use crate::model::Model;
 use crate::planner::{Allowance, Search};

@@ -8,8 +8,8 @@ mod training;
 
 use std::fmt::Write as _;
 
-use crate::golden;
-use crate::place::Place;
+use crate::pins::golden;
+use crate::pins::place::Place;
 
 /// Files by name and text, and the command line that is to be refused.
 type Case = (&'static [(&'static str, &'static str)], &'static str);

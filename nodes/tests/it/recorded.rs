@@ -1,9 +1,8 @@
 //! A recorded mission: the bag holds every topic, and readers that nobody here wrote read every message.
-#![allow(missing_docs, reason = "a test")]
-
-mod common;
 
 use serde_json::Value;
+
+use crate::common;
 
 #[test]
 fn outside_readers_read_every_message_of_a_recorded_mission() {

@@ -1,7 +1,4 @@
 //! What `swath` makes of recorded missions, on the one of `bags/samples`, and one over DDS.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
-
-mod common;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,6 +12,8 @@ use swath_ground::debrief::recorded::{NAMESPACE, Recorded};
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Act;
 use swath_mission::requests::logic::Review;
+
+use crate::common;
 
 fn sample() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../bags/samples/mission")

@@ -9,7 +9,7 @@ use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
 use crate::common;
-use crate::golden;
+use crate::pins::golden;
 
 /// Sums of networks depend on the order that a processor's widest instructions suggest: these settings of libtorch and
 /// the libraries below it choose the instructions that every x86-64 machine has. Missions by policies come out equal

@@ -1,8 +1,5 @@
 //! The request manager is killed at random moments, while requests are submitted and the satellite flies: what was
 //! acknowledged is there, nothing else is, nothing is imaged twice, and the mission goes on.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "a test")]
-
-mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,6 +8,8 @@ use std::time::Duration;
 use serde_json::Value;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Environment, Node, RosArgs, graph};
+
+use crate::common;
 
 /// Moments between kills: the same in each run, spread over 0.3 to 3 s.
 fn pause(kill: u64) -> Duration {

@@ -3,11 +3,8 @@
 //!
 //! Programs are those beside `swath`: `cargo xtask test` builds them all first. Before this test alone is run, it is
 //! `cargo build --release --workspace --bins` that makes them, or brings them up to date.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 mod bags;
-#[path = "../common/mod.rs"]
-mod common;
 mod golden;
 mod help;
 mod kept;

@@ -1,7 +1,7 @@
 //! `--help` of every command, and the node graph.
 
-use crate::golden;
-use crate::place::Place;
+use crate::pins::golden;
+use crate::pins::place::Place;
 
 /// Every program of the suite.
 pub const PROGRAMS: [&str; 7] =

@@ -1,8 +1,8 @@
 //! An operator's orders that are refused before anybody is asked, or because nobody is there.
 
 use super::{Case, refusals, refuse};
-use crate::golden;
-use crate::place::Place;
+use crate::pins::golden;
+use crate::pins::place::Place;
 
 const WORDS: &[Case] = &[
     (&[], "swath strips submit nowhere.geojson"),

@@ -1,7 +1,7 @@
 //! Missions that cannot be flown.
 
 use super::{Case, refuse};
-use crate::place::Place;
+use crate::pins::place::Place;
 
 const LAUNCH: &str = "swath launch m.toml --in-process --out out";
 

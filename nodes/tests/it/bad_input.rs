@@ -1,7 +1,6 @@
 //! Bad input: each a clear error, an exit code, and no mission harmed.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
-mod common;
+use crate::common;
 
 #[test]
 fn faulty_missions_are_refused_by_name_and_limit() {

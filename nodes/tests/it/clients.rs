@@ -1,13 +1,12 @@
 //! Clients of the request manager over DDS: calls that are too small or too large, and two that race for the same strips.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
-
-mod common;
 
 use std::sync::Barrier;
 use std::time::Duration;
 
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Environment, Node, RosArgs, graph};
+
+use crate::common;
 
 const TIMEOUT: Duration = Duration::from_secs(60);
 /// Strips that both clients want.

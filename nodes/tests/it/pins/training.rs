@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::golden;
-use crate::place::{Place, sha256};
+use crate::pins::golden;
+use crate::pins::place::{Place, sha256};
 
 /// Runs a command that prints JSON; the program's revision, which is another after every commit, is left out.
 fn json(place: &Place, line: &str) -> String {

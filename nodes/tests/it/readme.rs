@@ -1,5 +1,4 @@
 //! The README's picture of the node graph is the graph table's.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 #[test]
 fn the_diagram_is_made_from_the_table() {

@@ -1,11 +1,10 @@
 //! An operator's day, as `docs/operators-day.md` tells it: every command there is run here over DDS.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
-
-mod common;
 
 use std::path::Path;
 
 use serde_json::Value;
+
+use crate::common;
 
 struct Day {
     domain: String,
@@ -43,7 +42,7 @@ impl Day {
 
 /// The commands that the document shows, in order, without their leading `swath`.
 fn documented() -> Vec<String> {
-    let document = include_str!("../../docs/operators-day.md");
+    let document = include_str!("../../../docs/operators-day.md");
     document.lines().filter_map(|line| line.strip_prefix("$ swath ")).map(str::to_owned).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Nodes that cannot come up.
 
 use super::{Case, refuse};
-use crate::place::Place;
+use crate::pins::place::Place;
 
 const WORDS: &[Case] = &[
     (&[], "swath-spacecraft --fast"),

@@ -1,8 +1,7 @@
 //! An outside ROS 2 peer (CycloneDDS) receives states and status, submits strips that are then imaged, previews one and
 //! cancels one.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
-mod common;
+use crate::common;
 
 #[test]
 fn a_cyclonedds_peer_sees_the_mission_and_has_a_strip_imaged() {

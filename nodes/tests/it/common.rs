@@ -1,15 +1,14 @@
 //! Launching missions in tests.
-#![allow(dead_code, missing_docs, clippy::unwrap_used, reason = "each test uses its part")]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU16, Ordering};
 
-/// A DDS domain of this test's own: test binaries run one after the other, their tests side by side.
+/// A DDS domain of this test's own, from 100 to 229: tests run side by side, and so do those of other checkouts.
 pub fn domain() -> String {
     static NEXT: AtomicU16 = AtomicU16::new(0);
-    (100 + u16::try_from(std::process::id() % 10).unwrap_or(0) * 10 + NEXT.fetch_add(1, Ordering::Relaxed) % 10)
-        .to_string()
+    let first = std::process::id() % 13 * 10;
+    (100 + (first + u32::from(NEXT.fetch_add(1, Ordering::Relaxed))) % 130).to_string()
 }
 
 /// A program of this suite: cargo puts those of all its packages beside `swath`, but builds for a test only those of the
@@ -91,18 +90,6 @@ impl Drop for Running {
         if self.0.try_wait().unwrap().is_none() {
             self.stop();
         }
-    }
-}
-
-impl Running {
-    /// Its process number.
-    pub fn id(&self) -> u32 {
-        self.0.id()
-    }
-
-    /// Waits until it ends, and tells whether it succeeded.
-    pub fn wait(&mut self) -> bool {
-        self.0.wait().unwrap().success()
     }
 }
 

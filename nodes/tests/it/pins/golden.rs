@@ -9,7 +9,7 @@ const SHOWN: usize = 40;
 
 /// Where the pins lie.
 pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pins")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/pins")
 }
 
 /// The repository, wherever in it these pins lie.

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use crate::golden;
-use crate::place::{Place, sha256};
+use crate::pins::golden;
+use crate::pins::place::{Place, sha256};
 
 /// Missions by hand-written planners: file in `missions/`, and options.
 const HAND_WRITTEN: &[&str] = &[

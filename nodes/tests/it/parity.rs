@@ -1,10 +1,9 @@
 //! The strongest test of the suite: a mission over DDS in lockstep and the same one in one process give the same tasks,
 //! results and rewards, bit for bit.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
-
-mod common;
 
 use std::path::Path;
+
+use crate::common;
 
 const MISSION: &str = "orbits = 1.0\n[requests.random]\ncount = [1500, 1500]\n";
 

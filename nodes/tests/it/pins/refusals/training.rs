@@ -1,8 +1,8 @@
 //! Runs that cannot be trained, and evaluations that make no sense.
 
 use super::{Case, refuse};
-use crate::golden;
-use crate::place::Place;
+use crate::pins::golden;
+use crate::pins::place::Place;
 
 const RUN: &str = r#"name = "toy"
 steps = 40

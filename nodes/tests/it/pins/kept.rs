@@ -5,10 +5,10 @@ use std::process::Stdio;
 
 use serde_json::Value;
 
-use crate::bags::{export, refly, report};
 use crate::common::{self, Running, json_lines};
-use crate::golden;
-use crate::place::Place;
+use crate::pins::bags::{export, refly, report};
+use crate::pins::golden;
+use crate::pins::place::Place;
 
 /// Copies the kept files to a place: nobody writes to the originals.
 fn copied_to(place: Place) -> Place {

@@ -4,8 +4,8 @@ use std::fs;
 
 use super::{Case, refuse};
 use crate::common::{self, Running};
-use crate::golden;
-use crate::place::Place;
+use crate::pins::golden;
+use crate::pins::place::Place;
 
 const BAGS: &[Case] = &[
     (&[], "swath-bag info nowhere"),
