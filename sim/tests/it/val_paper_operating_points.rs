@@ -1,6 +1,5 @@
 //! The fixed-transition heuristic meets the paper's operating points (section V.A): T* = 80 s, 81 % success there, 99 %
 //! at 120 s.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use std::sync::Arc;
 

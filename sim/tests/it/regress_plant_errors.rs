@@ -1,5 +1,4 @@
 //! Missions whose satellite is not the one that its planner believes in, and requests that come in flight.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use std::sync::Arc;
 

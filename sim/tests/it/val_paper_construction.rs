@@ -1,6 +1,5 @@
 //! The paper's two-step reference attitude (eqs 2-10) equals the closed form that guidance uses, wherever the body looks.
 #![expect(non_snake_case, reason = "frame letters")]
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use approx::assert_relative_eq;
 use nalgebra::Vector3;

@@ -1,5 +1,4 @@
 //! Whole missions: nothing that is feasible fails for elevation, and a seed always gives the same mission.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use std::sync::Arc;
 

@@ -1,9 +1,8 @@
 //! Basilisk's closed-loop histories, flown again by this crate.
 #![expect(non_snake_case, reason = "frame letters")]
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 #[expect(dead_code, reason = "the command-line tool prints more")]
-#[path = "../examples/compare_basilisk/history.rs"]
+#[path = "../../examples/compare_basilisk/history.rs"]
 mod history;
 
 /// Largest difference in σ and ω [rad/s].

@@ -4,12 +4,13 @@
 
 use std::sync::Arc;
 
-use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::learn::observation::ObservationSet;
-use swath_sim::mission::horizon;
-use swath_sim::model::Model;
-use swath_sim::planner::{Decision, Planner, PlannerError};
 use thiserror::Error;
+
+use crate::learn::episode::{Env, EpisodeConfig};
+use crate::learn::observation::ObservationSet;
+use crate::mission::horizon;
+use crate::model::Model;
+use crate::planner::{Decision, Planner, PlannerError};
 
 /// How long to wait when no strip is left to choose from [s].
 const WAIT_S: f64 = 60.0;
@@ -117,6 +118,29 @@ pub fn wait(model: &Model) -> Decision {
 }
 
 /// Episodes of strip imaging, one task a step, each a pure function of its seed and the actions.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use swath_sim::learn::episode::EpisodeConfig;
+/// use swath_sim::learn::hybrid::{Action, Episode};
+/// use swath_sim::learn::observation::ObservationSet;
+/// use swath_sim::model::Model;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let model = Arc::new(Model::new(Default::default())?);
+/// let mut episode = Episode::new(model, EpisodeConfig::default(), ObservationSet::Table1);
+/// episode.begin(1)?;
+/// let shape = episode.shape();
+/// let (mut features, mut valid) = (vec![0.0; shape.len()], vec![false; shape.tokens]);
+/// episode.observe(&mut features, &mut valid)?;
+/// let token = valid.iter().position(|it| *it).expect("there is a strip to choose");
+/// // Two minutes before imaging, the longest transition.
+/// let outcome = episode.step(Action { token, parameter: 1.0 })?;
+/// assert!(outcome.duration_s > 120.0);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Episode {
     model: Arc<Model>,
     config: EpisodeConfig,
@@ -179,7 +203,7 @@ impl Episode {
         ObservationShape { tokens: self.model.config.planning.candidates, features: self.set.features() }
     }
 
-    /// Writes the present observation; see [`swath_sim::learn::observation::observe`].
+    /// Writes the present observation; see [`crate::learn::observation::observe`].
     ///
     /// # Errors
     /// Before [`Episode::begin`].
@@ -260,10 +284,10 @@ impl Episode {
 #[cfg(test)]
 mod tests {
     use approx::assert_abs_diff_eq;
-    use swath_sim::config::SimConfig;
-    use swath_sim::planner::PlannerSpec;
 
     use super::*;
+    use crate::config::SimConfig;
+    use crate::planner::PlannerSpec;
 
     /// Few strips, so that a teacher has to wait now and then.
     fn episode(strips: u32) -> Episode {

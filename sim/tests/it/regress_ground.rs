@@ -1,5 +1,4 @@
 //! Plans made on the ground: better than any planner that sees forty strips, below the bound, and worth what they say.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use std::sync::Arc;
 
