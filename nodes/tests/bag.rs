@@ -14,7 +14,7 @@ use swath_bags::{Bag, BagOptions, BagWriter, Filter};
 use swath_ground::debrief::recorded::{NAMESPACE, Recorded};
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Act;
-use swath_mission::requests::logic::Review;
+use swath_mission::orders::action::Review;
 
 fn sample() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../bags/samples/mission")
