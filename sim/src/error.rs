@@ -56,6 +56,14 @@ pub enum SimError {
         /// The name given.
         name: String,
     },
+    /// A name that is no station's.
+    #[error("no station `{name}` in the catalogue, which has {known}")]
+    UnknownStation {
+        /// The name given.
+        name: String,
+        /// Names that there are.
+        known: String,
+    },
     /// A strip that cannot be flown.
     #[error(transparent)]
     Strip(#[from] StripError),
