@@ -64,6 +64,9 @@ pub enum SimError {
         /// Names that there are.
         known: String,
     },
+    /// A transmitter without anybody who listens.
+    #[error("resources.transmitter_rate_bps is not 0, but there are no stations to send to")]
+    DownlinkWithoutStations,
     /// A strip that cannot be flown.
     #[error(transparent)]
     Strip(#[from] StripError),

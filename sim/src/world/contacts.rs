@@ -131,6 +131,45 @@ impl Contacts {
     }
 }
 
+/// Contacts of an orbit with stations, found as far as they are asked for.
+#[derive(Clone, Debug)]
+pub struct ContactPlan {
+    stations: Vec<Station>,
+    config: SimConfig,
+    orbit: Orbit,
+    period: TickPeriod,
+    contacts: Contacts,
+    until: Tick,
+}
+
+/// Contacts are found at least this far ahead [s].
+const PLAN_S: f64 = 86_400.0;
+
+impl ContactPlan {
+    /// The plan of an orbit.
+    #[must_use]
+    pub fn new(stations: Vec<Station>, config: &SimConfig, orbit: &Orbit, period: TickPeriod) -> Self {
+        let (config, orbit) = (SimConfig { resources: None, ..config.clone() }, orbit.clone());
+        Self { stations, config, orbit, period, contacts: Contacts::default(), until: Tick(0) }
+    }
+
+    /// Contacts, complete at least up to a day after a tick.
+    pub fn around(&mut self, tick: Tick) -> &Contacts {
+        let ahead = self.period.ticks_ceil(PLAN_S);
+        if tick.after(ahead) > self.until {
+            self.until = Tick(tick.0.saturating_mul(2)).after(ahead).after(ahead);
+            self.contacts = Contacts::new(&self.stations, &self.config, &self.orbit, self.period, self.until);
+        }
+        &self.contacts
+    }
+
+    /// The stations.
+    #[must_use]
+    pub fn stations(&self) -> &[Station] {
+        &self.stations
+    }
+}
+
 /// Where a station sees the satellite.
 #[derive(Clone, Debug)]
 pub struct View {
@@ -229,5 +268,9 @@ mod tests {
             assert_eq!(contacts.any(Tick(tick)), contacts.at(Tick(tick)).next().is_some(), "tick {tick}");
         }
         assert_eq!(Contacts::default().next(Tick(0)), None);
+        let mut plan = ContactPlan::new(stations, &model.config, &orbit, model.period);
+        assert_eq!(plan.around(Tick(0)).next(Tick(0)), contacts.next(Tick(0)));
+        let later = Tick(30_000_000);
+        assert!(plan.around(later).next(later).unwrap().0.since(later) < 172_800);
     }
 }
