@@ -29,6 +29,15 @@ pub enum Stage {
     End,
 }
 
+impl Stage {
+    /// Number of the time that it belongs to: start 0, middle 1, end 2.
+    #[inline]
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
 /// The body's and the wheels' constants.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -94,7 +103,7 @@ impl Plant {
         &self,
         state: &mut BodyState,
         torque: &Vector3<f64>,
-        external: impl Fn(Stage, &Vector3<f64>) -> Vector3<f64>,
+        mut external: impl FnMut(Stage, &Vector3<f64>) -> Vector3<f64>,
     ) {
         self.integrate(state, torque, |stage, sigma| torque - external(stage, sigma));
     }
@@ -105,7 +114,7 @@ impl Plant {
         &self,
         state: &mut BodyState,
         torque: &Vector3<f64>,
-        braking: impl Fn(Stage, &Vector3<f64>) -> Vector3<f64>,
+        mut braking: impl FnMut(Stage, &Vector3<f64>) -> Vector3<f64>,
     ) {
         let dt = self.dt;
         let half = 0.5 * dt;
@@ -114,13 +123,14 @@ impl Plant {
         let spin_half = spin0 + torque * half;
         let spin_end = spin0 + torque * dt;
 
-        let derivative = |stage: Stage, sigma: Vector3<f64>, omega: Vector3<f64>, spin: &Vector3<f64>| {
-            self.derivative(&sigma, &omega, spin, &braking(stage, &sigma))
-        };
-        let (ds1, dw1) = derivative(Stage::Start, sigma0, omega0, &spin0);
-        let (ds2, dw2) = derivative(Stage::Middle, sigma0 + ds1 * half, omega0 + dw1 * half, &spin_half);
-        let (ds3, dw3) = derivative(Stage::Middle, sigma0 + ds2 * half, omega0 + dw2 * half, &spin_half);
-        let (ds4, dw4) = derivative(Stage::End, sigma0 + ds3 * dt, omega0 + dw3 * dt, &spin_end);
+        let (sigma, omega) = (sigma0, omega0);
+        let (ds1, dw1) = self.derivative(&sigma, &omega, &spin0, &braking(Stage::Start, &sigma));
+        let (sigma, omega) = (sigma0 + ds1 * half, omega0 + dw1 * half);
+        let (ds2, dw2) = self.derivative(&sigma, &omega, &spin_half, &braking(Stage::Middle, &sigma));
+        let (sigma, omega) = (sigma0 + ds2 * half, omega0 + dw2 * half);
+        let (ds3, dw3) = self.derivative(&sigma, &omega, &spin_half, &braking(Stage::Middle, &sigma));
+        let (sigma, omega) = (sigma0 + ds3 * dt, omega0 + dw3 * dt);
+        let (ds4, dw4) = self.derivative(&sigma, &omega, &spin_end, &braking(Stage::End, &sigma));
 
         let sixth = dt / 6.0;
         let sigma = sigma0 + (ds1 + (ds2 + ds3) * 2.0 + ds4) * sixth;

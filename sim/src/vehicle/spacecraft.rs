@@ -155,7 +155,7 @@ impl Spacecraft {
         let (external, feed_forward) = onboard.torques(self.now, &positions_N, &self.body, plant, activity);
         self.torque_applied = plant.saturate(&(command + feed_forward), &self.body.wheel_speed);
         let torque = &self.torque_applied;
-        plant.step_under(&mut self.body, torque, |stage, sigma| external.torque(stage, sigma, &plant.inertia));
+        plant.step_under(&mut self.body, torque, |stage, _| external[stage.index()]);
         onboard.book(then, &positions_N[1], &self.body, plant, torque, activity);
     }
 }

@@ -34,11 +34,23 @@ impl DipoleField {
     #[inline]
     #[must_use]
     pub fn field_N(&self, r_BN_N: &Vector3<f64>, turn: (f64, f64)) -> Vector3<f64> {
-        let m_N = earth_to_inertial(turn, &self.coefficients_E);
         let inverse = 1.0 / r_BN_N.norm();
-        let up = r_BN_N * inverse;
-        let scale = self.reference_radius * inverse;
-        (up * (3.0 * up.dot(&m_N)) - m_N) * (scale * scale * scale)
+        self.field_above_N(&(r_BN_N * inverse), self.scale(1.0 / inverse), turn)
+    }
+
+    /// (R/r)³ at a radius [m].
+    #[must_use]
+    pub fn scale(&self, radius: f64) -> f64 {
+        let ratio = self.reference_radius / radius;
+        ratio * ratio * ratio
+    }
+
+    /// Field in N [T] in a direction from the Earth's centre, at the radius of a scale.
+    #[inline]
+    #[must_use]
+    pub fn field_above_N(&self, up_N: &Vector3<f64>, scale: f64, turn: (f64, f64)) -> Vector3<f64> {
+        let m_N = earth_to_inertial(turn, &self.coefficients_E);
+        (up_N * (3.0 * up_N.dot(&m_N)) - m_N) * scale
     }
 }
 

@@ -101,6 +101,11 @@ pub struct Onboard {
     cos_antenna: f64,
     /// 3μ/r³ [1/s²].
     gradient: f64,
+    /// (R/r)³ of the field.
+    field_scale: f64,
+    /// 1/r [1/m], and 1/(2·cos(n·dt/2)): the sum of two unit vectors a tick apart times this is the one between them.
+    inverse_radius: f64,
+    middle_scale: f64,
     dt: f64,
     bits_a_tick: (u64, u64),
     contacts: ContactPlan,
@@ -131,9 +136,13 @@ impl Onboard {
         let battery = Battery::new(capacity_j, config.battery_initial * capacity_j);
         let mu = model.config.earth.mu_m3_s2;
         let by = |wanted| config.desaturation == wanted;
+        let field = DipoleField::default();
         let mut onboard = Self {
             sun: config.sun(earth_radius),
-            field: DipoleField::default(),
+            field_scale: field.scale(orbit.radius),
+            field,
+            inverse_radius: 1.0 / orbit.radius,
+            middle_scale: 0.5 / libm::cos(0.5 * orbit.mean_motion * dt),
             earth: model.earth.clone(),
             array: config.array(),
             wheel_power: config.wheel_power(),
@@ -161,7 +170,8 @@ impl Onboard {
         Some(onboard)
     }
 
-    /// What turns the body over the tick that begins at `now`, and the wheels' torque that makes up for it [N m].
+    /// Torques that turn the body at start, middle and end of the tick that begins at `now`, and what the wheels' torque
+    /// must be changed by for those that are commanded [N m].
     #[inline]
     pub(crate) fn torques(
         &mut self,
@@ -170,10 +180,10 @@ impl Onboard {
         body: &BodyState,
         plant: &Plant,
         activity: Activity,
-    ) -> (External, Vector3<f64>) {
-        let [here, there] = positions_N;
+    ) -> ([Vector3<f64>; 3], Vector3<f64>) {
+        let (start_N, end_N) = (positions_N[0] * self.inverse_radius, positions_N[1] * self.inverse_radius);
         let momentum_B = body.wheel_speed * plant.wheel_inertia;
-        let field_N = self.field.field_N(here, self.earth.cos_sin(now));
+        let field_N = self.field.field_above_N(&start_N, self.field_scale, self.earth.cos_sin(now));
         let mut feed_forward = Vector3::zeros();
         self.state.rod_dipole_B = Vector3::zeros();
         if let Some(rods) = &self.rods {
@@ -188,10 +198,9 @@ impl Onboard {
             feed_forward += torque;
         }
         let dipole_B = self.state.rod_dipole_B + Vector3::from(self.config.residual_dipole_am2);
-        // On a circle the middle of a tick lies over the middle of its chord.
-        let scale = 1.0 / here.norm();
-        let up_N = [here * scale, (here + there).normalize(), there * scale];
-        (External { torque_B, dipole_B, field_N, up_N, gradient: self.gradient }, feed_forward)
+        let up_N = [start_N, (start_N + end_N) * self.middle_scale, end_N];
+        let external = External { torque_B, dipole_B, field_N, up_N, gradient: self.gradient };
+        (external.over_tick(&body.sigma_BN, &body.omega_BN_B, &plant.inertia, self.dt), feed_forward)
     }
 
     /// Books the tick that ended at `now` in a state, under a torque of the wheels [N m].

@@ -29,9 +29,13 @@ impl SolarArray {
     #[inline]
     #[must_use]
     pub fn power_w(&self, normal_N: &Vector3<f64>, r_SB_N: &Vector3<f64>, illumination: f64) -> f64 {
-        let inverse_square = 1.0 / r_SB_N.norm_squared();
-        let cos = normal_N.dot(r_SB_N) * inverse_square.sqrt();
-        self.full_w * (ASTRONOMICAL_UNIT * ASTRONOMICAL_UNIT * inverse_square) * illumination * cos.max(0.0)
+        let toward = normal_N.dot(r_SB_N);
+        if toward <= 0.0 {
+            return 0.0;
+        }
+        let inverse = 1.0 / r_SB_N.norm();
+        let scale = ASTRONOMICAL_UNIT * inverse;
+        self.full_w * (scale * scale) * illumination * (toward * inverse)
     }
 
     /// Power at normal incidence of the full Sun at one astronomical unit [W].
