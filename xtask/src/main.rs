@@ -1,9 +1,12 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|bench`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|chaos|soak`.
 
 mod bench;
+mod examples;
 mod libtorch;
+mod lint;
 mod prerequisites;
 mod process;
+mod soak;
 mod venv;
 
 use std::ffi::OsString;
@@ -24,7 +27,15 @@ usage: cargo xtask COMMAND
                    `cargo test`
   mission [ARGS…]  set up, build, and fly examples/missions/one_orbit.toml; ARGS
                    go to `swath launch` (--help shows them)
+  lint             check format, clippy, licences and sources of dependencies, and
+                   that all of them are used; builds the tools that are missing
   bench            run every crate's measurements and print one JSON object
+  chaos [--first SEED] --seeds N
+                   fly N missions whose faults are drawn from their seeds, check what
+                   must hold whatever fails, and print what repeats a failure
+  soak [NAME [SEEDS]]
+                   run a long figure to its end and print it as JSON; one that was
+                   stopped goes on; without a name, list them
 ";
 
 fn main() -> ExitCode {
@@ -47,7 +58,10 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("setup") => setup(&root, with_tests(rest)?),
         Some("test") => test(&root, rest),
         Some("mission") => mission(&root, rest),
+        Some("lint") => lint(&root, rest),
         Some("bench") => bench(&root, rest),
+        Some("chaos") => chaos(&root, rest),
+        Some("soak") => soak(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
             Ok(())
@@ -75,10 +89,10 @@ fn setup(root: &Path, tests: bool) -> Result<()> {
 }
 
 /// Runs every test in the release profile: what is tested is what is flown, and one build serves both commands. Programs
-/// come first: tests run those of other packages too, which cargo does not build for them.
+/// and examples come first: tests run those of other packages too, which cargo does not build for them.
 fn test(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, true)?;
-    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins"]))?;
+    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins", "--examples"]))?;
     let mut cargo = process::cargo(root, "test");
     cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));
@@ -102,6 +116,35 @@ fn bench(root: &Path, args: &[OsString]) -> Result<()> {
     }
     setup(root, false)?;
     bench::run(root)
+}
+
+fn lint(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("lint takes no arguments\n\n{USAGE}");
+    }
+    setup(root, false)?;
+    lint::run(root)
+}
+
+/// Missions in one process need neither torch nor Python: nothing is set up.
+fn chaos(root: &Path, args: &[OsString]) -> Result<()> {
+    let words: Option<Vec<&str>> = args.iter().map(|word| word.to_str()).collect();
+    let (first, count) = match words.as_deref() {
+        Some(["--seeds", count]) => ("0", *count),
+        Some(["--first", first, "--seeds", count] | ["--seeds", count, "--first", first]) => (*first, *count),
+        _ => bail!("chaos takes --seeds N, and --first SEED\n\n{USAGE}"),
+    };
+    for (name, text) in [("--first", first), ("--seeds", count)] {
+        text.parse::<u64>().with_context(|| format!("{name} {text} is no whole number"))?;
+    }
+    let mut cargo = process::cargo(root, "run");
+    cargo.args(["--quiet", "--release", "--package", "swath-mission", "--example", "chaos", "--", first, count]);
+    Err(process::become_command(&mut cargo))
+}
+
+fn soak(root: &Path, args: &[OsString]) -> Result<()> {
+    setup(root, true)?;
+    soak::run(root, args)
 }
 
 fn repository_root() -> Result<PathBuf> {

@@ -89,7 +89,7 @@ fn fly(seed: u64) -> Result<(Mission, Flown)> {
     let requests = (1..=flight.requests().len() as u64).map(StripId).filter_map(|id| {
         let request = flight.requests().request(id)?;
         let linked = flight.requests().strip(id).and_then(|strip| strip.linked);
-        Some((request.state, request.named.request.priority, linked))
+        Some((request.state, request.order.request.priority, linked))
     });
     let requests = requests.collect();
     let journal = flight.board().take_journal();
@@ -167,11 +167,8 @@ fn check_journal(flown: &Flown, horizon: Tick) -> Result<()> {
 fn check_alarm(scheduled: &Scheduled, flown: &Flown, horizon: Tick) -> Result<()> {
     let name = match scheduled.what {
         What::Process(process, _) => format!("{} lost", process.name()),
-        What::Drop(_) => "messages lost".to_owned(),
-        What::StoreFull => "store full".to_owned(),
-        What::BagFull => "recorder full".to_owned(),
         // A wheel shows when it is asked for torque, a bias when it stands out of the noise.
-        What::Vehicle(_) => return Ok(()),
+        _ => return Ok(()),
     };
     let from = scheduled.from;
     let of = |entry: &&Entry| entry.key.name == name && entry.tick >= from;

@@ -14,8 +14,8 @@ use swath_sim::vehicle::flight::{Flight, Situation};
 use swath_sim::vehicle::initial::InitialState;
 use thiserror::Error;
 
-use crate::alarms::conditions::{Report, back, of_health, of_plan, report_all};
-use crate::alarms::{Board, Key};
+use crate::alarms::Board;
+use crate::alarms::conditions::{Report, back, of_health, of_plan, of_planner, report_all};
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::orders::action::Action;
@@ -91,6 +91,9 @@ impl RequestKeeper for Desk {
         }
         self.requests.set_situation(*situation);
         *candidates = self.requests.on_decision_point(task, situation.now, &[]).candidates;
+        for contradiction in self.requests.take_contradictions() {
+            tracing::error!("{contradiction}");
+        }
         // Nobody keeps a journal here.
         self.requests.take_journal();
     }
@@ -126,14 +129,15 @@ impl InProcessMission {
     /// # Errors
     /// When a setting is out of range or a file of requests cannot be used.
     pub fn with_actions(mission: &Mission, actions: Vec<Action>) -> Result<Self, InProcessError> {
+        mission.faults.fits_one_process().map_err(MissionError::from)?;
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
         let initial = mission.initial_requests()?;
         let requested = initial.len();
-        for named in initial {
+        for order in initial {
             // Why one is refused is in the request manager's counts.
-            _ = requests.submit(named);
+            _ = requests.submit(order, Tick(0));
         }
         let faults = Troubles::new(mission, model.period);
         let away = faults.requests.clone();
@@ -217,9 +221,9 @@ impl InProcessMission {
             None => (planner.decide(&self.mission.context())?, self.mission.planning_delay()),
         };
         let settled = self.fly(decision, delay, until.min(self.mission.horizon()))?;
-        self.report(Some((decided_at, planner.replaced())));
+        self.report(Some(of_planner(decided_at, planner.replaced(), &planner.name())));
         let request = settled.record.strip.and_then(|id| self.requests().request(id));
-        let line = TaskLine::new(&settled, request.map(|request| request.named.name.as_str()));
+        let line = TaskLine::new(&settled, request.map(|request| request.order.name.as_str()));
         Ok(Some((settled, line)))
     }
 
@@ -241,19 +245,15 @@ impl InProcessMission {
         Executive::watching(self.mission.model(), self.faults.noisy)
     }
 
-    /// Tells the board what happened up to now; `planner` is when it decided, and why another one did in its place.
-    fn report(&mut self, planner: Option<(Tick, Option<&str>)>) {
+    /// Tells the board what happened up to now, and what the planner says of its decision.
+    fn report(&mut self, planner: Option<Report>) {
         let now = self.mission.now();
         let mut reports: Vec<Report> =
             self.mission.take_changes().iter().flat_map(|(tick, health)| of_health(*tick, health)).collect();
         while let Some(report) = self.to_report.pop_front_if(|report| report.tick <= now) {
             reports.push(report);
         }
-        if let Some((tick, replaced)) = planner {
-            let key = Key::new("planner", "planner replaced");
-            let text = replaced.unwrap_or("it decides").to_owned();
-            reports.push(Report { tick, key, wrong: replaced.is_some(), text });
-        }
+        reports.extend(planner);
         report_all(&mut self.board, reports);
         self.board.advance(now);
     }

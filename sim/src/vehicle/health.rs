@@ -11,6 +11,8 @@ use crate::vehicle::mrp;
 const SHORT: f64 = 0.75;
 /// Share of the torque limit that a command must reach before a wheel is judged by it.
 const WORTH_JUDGING: f64 = 0.05;
+/// The same where magnetorquers and thrusters act on the body too.
+const WORTH_JUDGING_AMONG_OTHERS: f64 = 0.5;
 /// Share of the torque limit below which a wheel counts as lost.
 const LOST: f64 = 0.02;
 /// Judgements in one sense, one after the other, before a wheel's health is taken to be another: 1.5 s at 2 Hz.
@@ -75,6 +77,8 @@ impl Default for Health {
 pub struct Watch {
     plant: Plant,
     dt: f64,
+    /// Share of the torque limit from which a wheel is judged.
+    worth_judging: f64,
     /// Weight of the newest comparison of gyro and star tracker, once for exact sensors and once for noisy ones.
     weight: f64,
     health: Health,
@@ -114,6 +118,10 @@ impl Watch {
         Self {
             plant: model.plant.clone(),
             dt: model.period.seconds(),
+            worth_judging: match model.config.resources {
+                Some(_) => WORTH_JUDGING_AMONG_OTHERS,
+                None => WORTH_JUDGING,
+            },
             weight: if noisy { 1.0 / 60.0 } else { 0.5 },
             health: Health::default(),
             last: None,
@@ -195,7 +203,7 @@ impl Watch {
         }
         for wheel in 0..3 {
             let (wanted, gave) = (commanded[wheel].abs(), given[wheel] * commanded[wheel].signum());
-            if wanted > WORTH_JUDGING * max[wheel] {
+            if wanted > self.worth_judging * max[wheel] {
                 self.judge(wheel, wanted, gave / max[wheel], gave < SHORT * wanted);
             }
         }

@@ -1,4 +1,5 @@
-//! The satellite: its body and wheels, its control and guidance, its errors, and the closed loop.
+//! The satellite: its body and wheels, its control and guidance, its errors, its power, data and momentum, and the closed
+//! loop.
 
 pub mod control;
 pub mod dynamics;
@@ -10,4 +11,5 @@ pub mod guidance;
 pub mod health;
 pub mod initial;
 pub mod mrp;
+pub mod resources;
 pub mod spacecraft;

@@ -90,6 +90,11 @@ impl LaunchArgs {
 #[expect(clippy::print_stdout, reason = "the summary is this command's result")]
 pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<()> {
     let mission = args.mission()?;
+    if args.in_process {
+        mission.faults.fits_one_process()?;
+    } else {
+        mission.faults.fits_dds()?;
+    }
     let requests = mission.initial_requests()?;
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
     let mission_file = output.write_mission(&mission, &requests)?;
@@ -130,6 +135,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         }
     })?;
     progress.finish();
+    output.write_alarms(&flight.board().take_journal())?;
     if let Some(error) = failed {
         return Err(error).context("cannot write tasks.jsonl");
     }

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use swath_mission::alarms::Entry;
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::geojson;
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
 
 /// Where bag, tasks and summary go.
@@ -40,7 +41,7 @@ impl OutputFolder {
     }
 
     /// Writes the mission as it is flown: `mission.toml`, and all its requests in `requests.geojson` beside it.
-    pub fn write_mission(&self, mission: &Mission, requests: &[NamedRequest]) -> Result<PathBuf> {
+    pub fn write_mission(&self, mission: &Mission, requests: &[Order]) -> Result<PathBuf> {
         geojson::write(&self.path.join("requests.geojson"), requests)?;
         let files = vec![PathBuf::from("requests.geojson")];
         let mission = Mission {
@@ -57,6 +58,20 @@ impl OutputFolder {
         serde_json::to_writer(&mut self.tasks, line)?;
         self.tasks.write_all(b"\n")?;
         Ok(self.tasks.flush()?)
+    }
+
+    /// Writes what happened to alarms as `alarms.jsonl`, if anything did.
+    pub fn write_alarms(&self, journal: &[Entry]) -> Result<()> {
+        if journal.is_empty() {
+            return Ok(());
+        }
+        let mut text = String::new();
+        for entry in journal {
+            text += &serde_json::to_string(entry)?;
+            text.push('\n');
+        }
+        let path = self.path.join("alarms.jsonl");
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// Writes `summary.json`.

@@ -10,7 +10,9 @@ use crate::faults::plan::{FaultPlan, Scheduled};
 
 /// Who tells of what the satellite knows of itself.
 const GUIDANCE: &str = "guidance";
-/// Who tells of lost nodes and messages.
+/// Who tells of planners that are replaced.
+const PLANNER: &str = "planner";
+/// Who tells of lost nodes.
 const LAUNCHER: &str = "launcher";
 
 /// A node says whether something is wrong.
@@ -32,9 +34,10 @@ impl Report {
     }
 }
 
-/// Reports, in the order of their ticks.
+/// Tells the board of reports, in the order of their ticks, and of the nodes' names at one tick, in which order ever they
+/// came.
 pub fn report_all(board: &mut Board, mut reports: Vec<Report>) {
-    reports.sort_by_key(|report| report.tick);
+    reports.sort_by(|a, b| (a.tick, &a.key).cmp(&(b.tick, &b.key)));
     for Report { tick, key, wrong, text } in reports {
         board.report(tick, key, Severity::Error, wrong, &text);
     }
@@ -60,6 +63,13 @@ pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
     reports
 }
 
+/// What the planner reports of a decision: why another one, `name`, made it in its place.
+#[must_use]
+pub fn of_planner(tick: Tick, replaced: Option<&str>, name: &str) -> Report {
+    let text = replaced.map_or_else(|| "it decides".to_owned(), |reason| format!("{reason}; {name} takes over"));
+    Report::new(tick, PLANNER, "planner replaced", replaced.is_some(), text)
+}
+
 /// What is reported of the faults by order that wheels and sensors do not show: when each begins and ends.
 #[must_use]
 pub fn of_plan(plan: &FaultPlan, period: TickPeriod) -> Vec<Report> {
@@ -81,13 +91,7 @@ pub fn back(lost: &Scheduled) -> Tick {
 }
 
 fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
-    let (node, name, text) = match it.what {
-        What::Process(process, Failure::Kill) => (LAUNCHER, format!("{} lost", process.name()), "killed by order"),
-        What::Process(process, Failure::Hang) => (LAUNCHER, format!("{} lost", process.name()), "hangs by order"),
-        What::Drop(_) => (LAUNCHER, "messages lost".to_owned(), "dropped by order"),
-        What::StoreFull => ("request_manager", "store full".to_owned(), "full by order"),
-        What::BagFull => ("recorder", "recorder full".to_owned(), "full by order"),
-        What::Vehicle(_) => return None,
-    };
-    Some((node, name, text.to_owned()))
+    let What::Process(process, failure) = it.what else { return None };
+    let text = if failure == Failure::Kill { "killed by order" } else { "hangs by order" };
+    Some((LAUNCHER, format!("{} lost", process.name()), text.to_owned()))
 }

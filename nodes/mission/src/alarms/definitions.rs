@@ -62,7 +62,7 @@ const fn moment(name: &'static str, severity: Severity, words: [&'static str; 3]
     Definition { off_delay_s: MOMENT_S, momentary: true, ..lasting(name, severity, words) }
 }
 
-/// A node is not there; the supervisor tells of each by `NODE lost`.
+/// A node is not there; the launcher tells of each by `NODE lost`.
 const NODE_LOST: Definition = lasting(
     "lost",
     Severity::Error,
@@ -103,42 +103,6 @@ pub const DEFINITIONS: &[Definition] = &[
             "the planner failed, is not there, or does not know what the satellite has lost",
             "another planner decides in its place",
             "look at the reason; choose another planner if it stays",
-        ],
-    ),
-    lasting(
-        "safe mode",
-        Severity::Critical,
-        [
-            "a node was started again as often as is allowed within a minute, and ended again",
-            "the attitude is held and nothing is imaged; requests are taken and kept",
-            "mend the cause, then lead the mission out with `swath safe-mode leave`",
-        ],
-    ),
-    lasting(
-        "store full",
-        Severity::Error,
-        [
-            "the file of requests cannot be written",
-            "requests are refused; the satellite goes on with those that are known",
-            "make room on the disk; it goes on by itself",
-        ],
-    ),
-    lasting(
-        "recorder full",
-        Severity::Error,
-        [
-            "the bag cannot be written",
-            "the mission is not recorded until there is room",
-            "make room on the disk; it goes on by itself",
-        ],
-    ),
-    lasting(
-        "messages lost",
-        Severity::Warn,
-        [
-            "messages on a topic are dropped",
-            "what is lost is asked for again; the mission is slower",
-            "look at the network, if nobody ordered it",
         ],
     ),
     moment(

@@ -26,6 +26,9 @@ impl Process {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Spacecraft, Self::Guidance, Self::Planner, Self::RequestManager, Self::Recorder];
 
+    /// Those that can fail in a mission in one process.
+    pub const IN_PROCESS: [Self; 3] = [Self::Guidance, Self::Planner, Self::RequestManager];
+
     /// Name of the node.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -66,6 +66,16 @@ pub enum FaultPlanError {
         /// How long it was to be [s].
         for_s: f64,
     },
+    /// It cannot be made to happen where the mission is flown.
+    #[error("{fault} cannot be flown {place}: {can}")]
+    NotHere {
+        /// The fault.
+        fault: PlannedFault,
+        /// Where the mission is flown.
+        place: &'static str,
+        /// What can fail there.
+        can: &'static str,
+    },
     /// There are too many.
     #[error("{count} faults are planned, the most are {FAULTS_MAX}")]
     TooMany {
@@ -135,6 +145,36 @@ impl FaultPlan {
     /// The first fault that cannot be flown.
     pub fn validate(&self, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
         check(&self.plan, Tick(0), horizon, period)
+    }
+
+    /// Checks that a mission in one process can fly the faults: there are no messages, stores and bags in it.
+    ///
+    /// # Errors
+    /// The first that it cannot.
+    pub fn fits_one_process(&self) -> Result<(), FaultPlanError> {
+        let flown = |what: What| match what {
+            What::Vehicle(_) => true,
+            What::Process(process, _) => Process::IN_PROCESS.contains(&process),
+            What::Drop(_) | What::StoreFull | What::BagFull => false,
+        };
+        let can = "wheels, gyro, star tracker, guidance, planner and request_manager can fail there";
+        self.each(flown, "in one process", can)
+    }
+
+    /// Checks that a mission over DDS can fly the faults.
+    ///
+    /// # Errors
+    /// The first that it cannot.
+    pub fn fits_dds(&self) -> Result<(), FaultPlanError> {
+        let can = "wheels, gyro and star tracker can fail there; nodes fail by order with --in-process";
+        self.each(|what| matches!(what, What::Vehicle(_)), "over DDS", can)
+    }
+
+    fn each(&self, flown: impl Fn(What) -> bool, place: &'static str, can: &'static str) -> Result<(), FaultPlanError> {
+        match self.plan.iter().find(|fault| !flown(fault.what)) {
+            Some(&fault) => Err(FaultPlanError::NotHere { fault, place, can }),
+            None => Ok(()),
+        }
     }
 
     /// Adds a fault that is ordered at `now`.
@@ -249,6 +289,23 @@ mod tests {
             "store:full+10s",
         ]);
         assert_eq!(fine.validate(HORIZON, period()), Ok(()));
+    }
+
+    #[test]
+    fn what_cannot_fail_where_it_is_flown_is_named() {
+        let refused = |texts: &[&str], dds: bool| {
+            let plan = plan(texts);
+            let checked = if dds { plan.fits_dds() } else { plan.fits_one_process() };
+            checked.map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(&["wheel1:dead@5s", "guidance:kill@5s", "request_manager:hang@5s+9s"], false), Ok(()));
+        assert_eq!(refused(&["wheel1:dead@5s", "startracker:out@5s"], true), Ok(()));
+        for (text, dds) in [("store:full", false), ("topic:drop 5%@1s", false), ("spacecraft:kill@5s", false)] {
+            let error = refused(&[text], dds).unwrap_err();
+            assert!(error.starts_with(&format!("{text} cannot be flown in one process: wheels, gyro")), "{error}");
+        }
+        let error = refused(&["gyro:bias 0.1deg/s@5s", "planner:kill@9s"], true).unwrap_err();
+        assert!(error.starts_with("planner:kill@9s cannot be flown over DDS"), "{error}");
     }
 
     #[test]

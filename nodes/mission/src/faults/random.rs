@@ -1,4 +1,4 @@
-//! Faults drawn from a seed.
+//! Faults drawn from a seed: those that a mission in one process can fly.
 
 use rand::RngExt;
 use swath_sim::rng;
@@ -26,7 +26,6 @@ fn fault(rng: &mut Rng, end_s: f64) -> PlannedFault {
     // Half of the wheels' faults stay; so do none of the others, so that what comes after them is seen too.
     let stays = matches!(what, What::Vehicle(Fault::Wheel(..))) && rng.random_bool(0.5);
     let at_once = match what {
-        What::Process(Process::Spacecraft, _) => true,
         What::Process(..) => rng.random_bool(0.5),
         _ => false,
     };
@@ -34,20 +33,17 @@ fn fault(rng: &mut Rng, end_s: f64) -> PlannedFault {
 }
 
 fn what(rng: &mut Rng) -> What {
-    let process = Process::ALL[rng.random_range(0..Process::ALL.len())];
+    let process = Process::IN_PROCESS[rng.random_range(0..Process::IN_PROCESS.len())];
     let wheel = rng.random_range(0..3);
     let percent = f64::from(rng.random_range(5..=95u32)) / 100.0;
-    match rng.random_range(0..12u32) {
+    match rng.random_range(0..10u32) {
         0..3 => What::Process(process, Failure::Kill),
         3..5 => What::Process(process, Failure::Hang),
-        5 => What::Drop(percent),
-        6 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Dead)),
-        7 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Stuck)),
-        8 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Weak(percent))),
-        9 => What::Vehicle(Fault::GyroBias((f64::from(rng.random_range(5..=100u32)) / 1000.0).to_radians())),
-        10 => What::Vehicle(Fault::StarTrackerOut),
-        _ if rng.random_bool(0.5) => What::StoreFull,
-        _ => What::BagFull,
+        5 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Dead)),
+        6 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Stuck)),
+        7 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Weak(percent))),
+        8 => What::Vehicle(Fault::GyroBias((f64::from(rng.random_range(5..=100u32)) / 1000.0).to_radians())),
+        _ => What::Vehicle(Fault::StarTrackerOut),
     }
 }
 

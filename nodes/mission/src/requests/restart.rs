@@ -4,22 +4,23 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::StripId;
 
-use super::logic::{RequestLogic, Stored};
+use super::logic::RequestLogic;
 use super::refusal::Refusal;
+use super::request::Stored;
 
 impl RequestLogic {
     /// The requests as a store gives them back, in the order of their numbers.
     #[must_use]
     pub fn stored(&self) -> Vec<Stored> {
-        let of = |(number, request): (u64, &super::logic::Request)| {
-            let listed = self.catalogue.get(StripId(number));
-            Stored {
-                request: request.clone(),
+        let of = |id: StripId| {
+            let listed = self.catalogue.get(id);
+            Some(Stored {
+                request: self.request(id)?.clone(),
                 windows: listed.map(|it| it.windows.clone()).unwrap_or_default(),
                 linked: listed.and_then(|it| it.linked),
-            }
+            })
         };
-        (1..).zip(&self.requests).map(of).collect()
+        (1..=self.len() as u64).map(StripId).filter_map(of).collect()
     }
 
     /// The one that takes over when this one is lost, in a mission that began at `initial` and ends at `horizon`: it

@@ -175,10 +175,9 @@ impl GuidanceLogic {
         self
     }
 
-    /// What is known of wheels and sensors.
-    #[must_use]
-    pub fn health(&self) -> Health {
-        self.executive.health()
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.executive.take_changes()
     }
 
     /// Takes a state. A state seen before brings its command again, so that a lost sample stops nothing.
