@@ -89,11 +89,12 @@ impl Sun {
         } else if c < a - b {
             1.0 - (b / a) * (b / a)
         } else if c < a + b {
+            // Angles from both legs, and the height by Heron's formula: the usual arc cosines lose half the digits here.
             let x = (c * c + a * a - b * b) / (2.0 * c);
-            let y = (a * a - x * x).max(0.0).sqrt();
-            let half_angle = |part: f64| libm::acos(part.clamp(-1.0, 1.0));
-            let hidden = a * a * half_angle(x / a) + b * b * half_angle((c - x) / b) - c * y;
-            1.0 - hidden / (std::f64::consts::PI * a * a)
+            let product = (a + b + c) * (a + b - c) * (c + a - b) * (c + b - a);
+            let y = product.max(0.0).sqrt() / (2.0 * c);
+            let hidden = a * a * libm::atan2(y, x) + b * b * libm::atan2(y, c - x) - c * y;
+            (1.0 - hidden / (std::f64::consts::PI * a * a)).clamp(0.0, 1.0)
         } else {
             1.0
         }

@@ -74,7 +74,7 @@ pub struct ResourceState {
     pub sent_bits: u64,
     /// Dipole of the rods over the last tick, in B [A m²].
     pub rod_dipole_B: Vector3<f64>,
-    /// What failed first, and when.
+    /// What failed last, and when.
     pub failure: Option<(Tick, Failure)>,
 }
 
@@ -218,23 +218,20 @@ impl Onboard {
             self.storage.record(strip, self.bits_a_tick.0);
         }
         self.transmit(now, r_BN_N, body, activity);
-        self.power(r_BN_N, body, torque, activity);
+        let met = self.power(r_BN_N, body, torque, activity);
         self.state.stored_bits = self.storage.stored();
         self.state.to_send_bits = self.storage.to_send();
         self.state.charge_j = self.battery.charge_j();
         if body.wheel_speed.amax() * plant.wheel_inertia > self.config.wheel_momentum_max_nms {
-            self.state.failure.get_or_insert((now, Failure::WheelMomentum));
+            self.state.failure = Some((now, Failure::WheelMomentum));
         }
-        if !self.met() {
-            self.state.failure.get_or_insert((now, Failure::BatteryEmpty));
+        if !met {
+            self.state.failure = Some((now, Failure::BatteryEmpty));
         }
     }
 
-    fn met(&self) -> bool {
-        self.battery.books().unmet_nj == 0
-    }
-
-    fn power(&mut self, r_BN_N: &Vector3<f64>, body: &BodyState, torque: &Vector3<f64>, activity: Activity) {
+    /// Says whether the battery had what was asked for.
+    fn power(&mut self, r_BN_N: &Vector3<f64>, body: &BodyState, torque: &Vector3<f64>, activity: Activity) -> bool {
         let config = &self.config;
         self.state.illumination = self.sun.illumination(r_BN_N);
         let mut generated_w = 0.0;
@@ -262,8 +259,8 @@ impl Onboard {
         if activity.desaturate.is_some() && self.thrusters.is_some() {
             asked_w += config.thruster_w;
         }
-        self.battery.flow(generated_w * self.dt, asked_w * self.dt);
         (self.state.generated_w, self.state.asked_w) = (generated_w, asked_w);
+        self.battery.flow(generated_w * self.dt, asked_w * self.dt)
     }
 
     fn transmit(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState, activity: Activity) {
