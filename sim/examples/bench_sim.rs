@@ -17,7 +17,7 @@ use swath_sim::rng;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
-use swath_sim::vehicle::resources::config::{Profile, ResourcesConfig};
+use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripRequest;

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::model::Model;
-use crate::planner::{Decision, DecisionContext, Planner, PlannerError};
+use crate::planner::{Decision, DecisionContext, Planner, PlannerError, Shield};
 use crate::requests::catalogue::Candidate;
 use crate::task::{Duty, SettledTask, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::flight::{Flight, Situation};
-use crate::vehicle::resources::config::Desaturation;
 use crate::vehicle::resources::{Failure, Onboard};
 
 /// Whoever keeps the requests of a mission.
@@ -23,7 +22,7 @@ pub trait RequestKeeper {
 }
 
 /// Images that came to the ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Delivered {
     /// How many.
     pub strips: u64,
@@ -47,6 +46,7 @@ pub struct Mission<K> {
     /// Time from a situation to the start of the task decided on it [ticks].
     planning_delay: u32,
     delivered: Delivered,
+    shield: Option<Shield>,
     /// What failed and is not mended yet.
     safe_mode: Option<Failure>,
 }
@@ -57,6 +57,7 @@ impl<K: RequestKeeper> Mission<K> {
     pub fn new(model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
         let situation = flight.situation();
         let (task, previous, candidates) = (0, None, Vec::new());
+        let shield = Shield::new(&model);
         let mut mission = Self {
             model,
             flight,
@@ -68,6 +69,7 @@ impl<K: RequestKeeper> Mission<K> {
             candidates,
             planning_delay: 0,
             delivered: Delivered::default(),
+            shield,
             safe_mode: None,
         };
         mission.refresh();
@@ -176,11 +178,24 @@ impl<K: RequestKeeper> Mission<K> {
         if self.over() {
             return Ok(None);
         }
-        let decision = match self.safe_decision() {
-            Some(decision) => decision,
-            None => planner.decide(&self.context())?,
-        };
+        let decision = self.decide(planner)?;
         self.fly(decision, until.min(self.horizon)).map(Some)
+    }
+
+    /// What comes next: safe mode decides, or the shield, or the planner within what the shield allows.
+    ///
+    /// # Errors
+    /// When the planner gave no usable decision.
+    pub fn decide(&self, planner: &mut dyn Planner) -> Result<Decision, PlannerError> {
+        if let Some(decision) = self.safe_decision() {
+            return Ok(decision);
+        }
+        let context = self.context();
+        let Some(shield) = &self.shield else { return planner.decide(&context) };
+        match shield.before(&context) {
+            Some(decision) => Ok(decision),
+            None => Ok(shield.check(&context, planner.decide(&context)?)),
+        }
     }
 
     /// Decides and flies to the mission's end, handing each task to `each`.
@@ -222,7 +237,7 @@ impl<K: RequestKeeper> Mission<K> {
     /// What safe mode does next; nothing while all is well.
     fn safe_decision(&self) -> Option<Decision> {
         let failure = self.safe_mode?;
-        let thrusters = self.onboard().is_some_and(|it| it.config().desaturation == Desaturation::Thrusters);
+        let thrusters = self.onboard().is_some_and(Onboard::has_thrusters);
         let duty = if failure == Failure::WheelMomentum && thrusters { Duty::Desaturate } else { Duty::Charge };
         Some(Decision::Serve { duty, ticks: self.model.period.ticks_ceil(SAFE_MODE_S).max(1) })
     }

@@ -5,7 +5,7 @@ use crate::error::SimError;
 use crate::time::TickPeriod;
 use crate::vehicle::control::ControlLaw;
 use crate::vehicle::dynamics::Plant;
-use crate::world::stations::Station;
+use crate::config::station::Station;
 use crate::world::turn::{Turn, earth_turn};
 
 /// A validated configuration with what follows from it.

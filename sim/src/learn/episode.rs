@@ -18,7 +18,7 @@ use crate::time::Tick;
 use crate::vehicle::errors::PlantErrors;
 use crate::vehicle::flight::{Flight, Situation};
 use crate::vehicle::initial::InitialState;
-use crate::vehicle::resources::config::RewardKind;
+use crate::config::resources::RewardKind;
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::strip::{StripId, StripRequest};
 

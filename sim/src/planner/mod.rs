@@ -3,11 +3,13 @@
 mod heuristic;
 mod lookahead;
 mod random;
+mod shield;
 mod spec;
 
 pub use heuristic::Heuristic;
 pub use lookahead::{Allowance, Beam, BeamSearch, Experience, Found, Lookahead, Search, Sequence, wait_for_a_window};
 pub use random::Random;
+pub use shield::Shield;
 pub use spec::{PlannerSpec, UnknownPlanner};
 
 use thiserror::Error;

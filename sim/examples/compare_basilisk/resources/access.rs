@@ -6,7 +6,7 @@ use anyhow::Result;
 use serde::Deserialize;
 use swath_sim::time::Tick;
 use swath_sim::world::contacts::{View, contacts_of};
-use swath_sim::world::stations::Station;
+use swath_sim::config::station::Station;
 
 use super::read::Input;
 use super::{Check, Comparison};

@@ -6,8 +6,8 @@ use crate::model::Model;
 use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
 use crate::vehicle::mrp::Rotation;
-use crate::vehicle::resources::battery::{Battery, J_PER_WH, SolarArray, WheelPower};
-use crate::vehicle::resources::config::{Antenna, Desaturation, ResourcesConfig};
+use crate::vehicle::resources::battery::{Battery, SolarArray, WheelPower};
+use crate::config::resources::{Antenna, Desaturation, ResourcesConfig};
 use crate::vehicle::resources::momentum::{External, Rods, Thrusters};
 use crate::vehicle::resources::storage::{ImageFile, Storage};
 use crate::world::contacts::{ContactPlan, View};
@@ -132,7 +132,7 @@ impl Onboard {
         let earth_radius = model.config.earth.radius_m;
         let stations = model.stations.clone();
         let dt = model.period.seconds();
-        let capacity_j = config.battery_capacity_wh * J_PER_WH;
+        let capacity_j = config.battery_capacity_j();
         let battery = Battery::new(capacity_j, config.battery_initial * capacity_j);
         let mu = model.config.earth.mu_m3_s2;
         let by = |wanted| config.desaturation == wanted;
@@ -317,6 +317,12 @@ impl Onboard {
     #[must_use]
     pub fn config(&self) -> &ResourcesConfig {
         &self.config
+    }
+
+    /// Whether momentum is taken out by thrusters, which takes a task.
+    #[must_use]
+    pub fn has_thrusters(&self) -> bool {
+        self.config.has_thrusters()
     }
 
     /// The battery.

@@ -1,5 +1,4 @@
 //! Power, data and momentum in flight: books that close, duties that do what they say, failures that are told.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
 use std::sync::Arc;
 
@@ -15,7 +14,7 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::resources::Failure;
-use swath_sim::vehicle::resources::config::{Profile, ResourcesConfig};
+use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::vehicle::spacecraft::Spacecraft;
 
 fn model(profile: Profile, change: impl Fn(&mut ResourcesConfig)) -> Arc<Model> {
@@ -47,7 +46,8 @@ fn serve(flight: &mut Flight, duty: Duty, ticks: u32, mut each: impl FnMut(&Flig
 #[test]
 fn books_close_over_missions_of_both_profiles() {
     for (profile, seed) in [(Profile::Minisat, 1), (Profile::Bsk, 2)] {
-        let model = model(profile, |_| {});
+        // The shield would send.
+        let model = model(profile, |it| it.shield = false);
         let mut env = episode(&model, 4.0, seed);
         let mut imaged = 0.0;
         env.run(&mut Heuristic { t_pre_s: 80.0 }, |task| imaged += task.reward).unwrap();
@@ -97,7 +97,7 @@ fn charging_points_the_array_at_the_sun() {
 
 #[test]
 fn a_body_fixed_antenna_sends_in_downlink_tasks_alone() {
-    let model = model(Profile::Bsk, |it| it.downlink_order = swath_sim::vehicle::resources::config::DownlinkOrder::Oldest);
+    let model = model(Profile::Bsk, |it| it.downlink_order = swath_sim::config::resources::DownlinkOrder::Oldest);
     let mut env = episode(&model, 15.0, 5);
     let mut heuristic = Heuristic { t_pre_s: 100.0 };
     let mut sent_elsewhere = 0;
@@ -134,7 +134,7 @@ fn thrusters_and_rods_take_momentum_out_of_the_wheels() {
     let after = of(&flown, &rods);
     assert!(after < 0.2 * before, "{before} to {after} N m s by rods");
     let none = model(Profile::Minisat, |it| {
-        it.desaturation = swath_sim::vehicle::resources::config::Desaturation::None;
+        it.desaturation = swath_sim::config::resources::Desaturation::None;
         (it.gravity_gradient, it.disturbance_nm, it.residual_dipole_am2) = (false, [0.0; 3], [0.0; 3]);
     });
     let mut flown = flight(&none, 4);
@@ -148,6 +148,7 @@ fn thrusters_and_rods_take_momentum_out_of_the_wheels() {
 fn an_empty_battery_ends_an_episode_and_is_safe_mode_in_flight() {
     let model = model(Profile::Minisat, |it| {
         (it.battery_capacity_wh, it.battery_initial, it.failure_penalty) = (60.0, 0.3, 5.0);
+        it.shield = false;
     });
     let mut env = episode(&model, 3.0, 11);
     let mut heuristic = Heuristic { t_pre_s: 60.0 };
@@ -171,6 +172,35 @@ fn an_empty_battery_ends_an_episode_and_is_safe_mode_in_flight() {
     assert!(in_safe_mode > 3 && env.safe_mode().is_none(), "{in_safe_mode} tasks in safe mode");
     assert!(env.onboard().unwrap().battery().level() >= 0.25);
     assert!(env.onboard().unwrap().battery().books_close());
+}
+
+#[test]
+fn the_shield_keeps_the_battery_above_its_floor_and_sends_and_desaturates() {
+    for (profile, seed) in [(Profile::Minisat, 21), (Profile::Minisat, 22), (Profile::Bsk, 23), (Profile::Bsk, 24)] {
+        // A bus that a planner which does not know of power cannot feed.
+        let change = |it: &mut ResourcesConfig, shield| {
+            it.shield = shield;
+            it.battery_initial = 0.5;
+            it.bus_w = if profile == Profile::Minisat { 140.0 } else { 20.0 };
+        };
+        let fly = |shield| {
+            let model = model(profile, |it| change(it, shield));
+            let mut env = episode(&model, 6.0, seed);
+            let (mut lowest, mut imaged) = (1.0f64, 0.0);
+            let mut planner = Heuristic { t_pre_s: 80.0 };
+            while let Some(task) = env.fly_one(&mut planner, env.horizon()).unwrap() {
+                lowest = lowest.min(env.onboard().unwrap().battery().level());
+                imaged += task.reward;
+            }
+            let momentum = env.context().situation.body.wheel_speed.amax() * model.plant.wheel_inertia;
+            (lowest, imaged, *env.delivered(), momentum)
+        };
+        let (lowest, imaged, delivered, momentum) = fly(true);
+        assert!(lowest >= 0.25 && delivered.failures == 0, "{profile:?} {seed}: {lowest} {delivered:?}");
+        assert!(imaged > 20.0 && delivered.strips > 0, "{profile:?} {seed}: {imaged} {delivered:?}");
+        assert!(momentum < 12.5 || profile == Profile::Minisat);
+        assert!(fly(false).0 < 0.25, "{profile:?} {seed}: without the shield the floor holds too");
+    }
 }
 
 #[test]

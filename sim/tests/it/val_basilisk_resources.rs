@@ -1,8 +1,7 @@
 //! Basilisk's histories of Sun, battery, data, access and momentum, computed again by this crate.
 #![expect(non_snake_case, reason = "frame letters")]
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test")]
 
-#[path = "../examples/compare_basilisk/resources/mod.rs"]
+#[path = "../../examples/compare_basilisk/resources/mod.rs"]
 mod resources;
 
 use std::collections::BTreeMap;
