@@ -5,6 +5,7 @@ use std::sync::Arc;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
+use crate::config::resources::RewardKind;
 use crate::error::{SimError, StripError};
 use crate::learn::observation::{ObservationSet, observe};
 use crate::mission::{Mission, RequestKeeper, horizon, windows_until};
@@ -18,7 +19,6 @@ use crate::time::Tick;
 use crate::vehicle::errors::PlantErrors;
 use crate::vehicle::flight::{Flight, Situation};
 use crate::vehicle::initial::InitialState;
-use crate::config::resources::RewardKind;
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::strip::{StripId, StripRequest};
 

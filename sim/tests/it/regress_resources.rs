@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use swath_sim::config::SimConfig;
+use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Heuristic, Planner, PlannerError};
@@ -14,7 +15,6 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::resources::Failure;
-use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::vehicle::spacecraft::Spacecraft;
 
 fn model(profile: Profile, change: impl Fn(&mut ResourcesConfig)) -> Arc<Model> {

@@ -13,7 +13,9 @@ fn histories() -> Vec<(PathBuf, Value)> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/basilisk_resources");
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let histories = files.filter(|path| path.extension().is_some_and(|extension| extension == "json"));
-    histories.map(|path| (path.clone(), serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap())).collect()
+    histories
+        .map(|path| (path.clone(), serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()))
+        .collect()
 }
 
 #[test]
@@ -28,7 +30,15 @@ fn histories_of_every_kind_are_reproduced() {
     }
     let names: Vec<&str> = kinds.keys().map(String::as_str).collect();
     let wanted = [
-        "access", "battery", "data", "eclipse", "gg_tumble", "momentum", "panel_replay", "panel_tumble", "wheel_power",
+        "access",
+        "battery",
+        "data",
+        "eclipse",
+        "gg_tumble",
+        "momentum",
+        "panel_replay",
+        "panel_tumble",
+        "wheel_power",
         "wheel_replay",
     ];
     assert_eq!(names, wanted);
