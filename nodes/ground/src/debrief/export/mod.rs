@@ -4,7 +4,7 @@ mod czml;
 pub mod geo;
 pub mod table;
 mod tables;
-mod track;
+pub mod track;
 
 use std::fs;
 use std::path::PathBuf;
