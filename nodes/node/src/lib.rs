@@ -3,4 +3,6 @@
 pub mod messages;
 pub mod node;
 pub mod orders;
+pub mod out;
+pub mod program;
 pub mod stamp;

@@ -14,6 +14,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
+use swath_node::out;
 
 /// `swath strips`.
 #[derive(Debug, Args)]
@@ -94,7 +95,7 @@ fn read_files(
     for file in files {
         let import = swath_mission::orders::geojson::import(file, lengths)?;
         for (feature, reason) in &import.refused {
-            eprintln!("requests {}, feature {feature}: {reason}", file.display());
+            out::say(format_args!("requests {}, feature {feature}: {reason}", file.display()));
         }
         all.lines += import.lines;
         all.requests.extend(import.requests);

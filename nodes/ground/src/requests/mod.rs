@@ -1,6 +1,7 @@
 //! The request manager's node: its topics, its services, and the store that keeps what was acknowledged.
 
 mod desk;
+mod lock;
 pub mod messages;
 mod outgoing;
 pub mod store;

@@ -16,7 +16,7 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::messages::state_sample;
 
 use super::places::{Place, attitude_E, position_E, sub_satellite};
-use super::recorded::{NAMESPACE, Recorded};
+use super::recorded::{Recorded, RecordedArgs};
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -26,8 +26,8 @@ use super::recorded::{NAMESPACE, Recorded};
 Writes tasks, states and decisions as .csv and .parquet, strips.geojson and ground_track.geojson, and
 mission.czml with orbit and attitude for Cesium.")]
 pub struct ExportArgs {
-    /// Bag directory or .mcap file of a mission
-    bag: PathBuf,
+    #[command(flatten)]
+    recorded: RecordedArgs,
     /// Folder for the files; it is made if it is not there
     #[arg(short, long)]
     output: PathBuf,
@@ -37,9 +37,6 @@ pub struct ExportArgs {
     /// Time between points of ground track, orbit and attitude [s]
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = step)]
     step: f64,
-    /// Namespace of the mission's nodes
-    #[arg(long, default_value = NAMESPACE)]
-    namespace: String,
 }
 
 /// A kind of file.
@@ -79,7 +76,7 @@ impl ExportArgs {
     /// # Errors
     /// When the bag holds no mission or a file cannot be written.
     pub fn run(self) -> Result<ExitCode> {
-        let recorded = Recorded::open(&self.bag, &self.namespace)?;
+        let recorded = self.recorded.open()?;
         let folder = &self.output;
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let wanted = |format| self.format.is_empty() || self.format.contains(&format);
