@@ -16,13 +16,13 @@ use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::task::Totals;
 use swath_sim::time::Tick;
 
-use output::OutputFolder;
+use output::{Flown, OutputFolder};
 use progress::Progress;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::file::Mission;
 use swath_mission::guarded::{GuardedPlanner, Policies, made_instead};
 use swath_mission::in_process::InProcessMission;
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
 
@@ -87,12 +87,6 @@ impl LaunchArgs {
     }
 }
 
-/// A mission that was flown, to its end or until something went wrong.
-struct Flown {
-    summary: Summary,
-    failure: Option<Error>,
-}
-
 /// The exit code of a mission that was flown, but not by the planner that was asked for.
 const NOT_AS_ASKED: u8 = 3;
 
@@ -137,7 +131,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
 fn fly(
     args: &LaunchArgs,
     mission: &Mission,
-    requests: &[NamedRequest],
+    requests: &[Order],
     output: &mut OutputFolder,
     policies: &Policies,
 ) -> Result<Flown> {

@@ -4,12 +4,20 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
 
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::geojson;
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
+
+/// A mission that was flown, to its end or until something went wrong.
+pub struct Flown {
+    /// What came of it.
+    pub summary: Summary,
+    /// What went wrong.
+    pub failure: Option<Error>,
+}
 
 /// Where bag, tasks and summary go.
 pub struct OutputFolder {
@@ -58,7 +66,7 @@ impl OutputFolder {
     }
 
     /// Writes the mission as it is flown: `mission.toml`, and all its requests in `requests.geojson` beside it.
-    pub fn write_mission(&self, mission: &Mission, requests: &[NamedRequest]) -> Result<PathBuf> {
+    pub fn write_mission(&self, mission: &Mission, requests: &[Order]) -> Result<PathBuf> {
         geojson::write(&self.path.join("requests.geojson"), requests)?;
         let files = vec![PathBuf::from("requests.geojson")];
         let mission = Mission {

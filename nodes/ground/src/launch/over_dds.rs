@@ -12,9 +12,8 @@ use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
 
-use super::Flown;
 use super::fleet::Fleet;
-use super::output::OutputFolder;
+use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use swath_mission::file::Mission;
 use swath_mission::guarded::{Deciders, Policies};
