@@ -2,6 +2,7 @@
 
 mod client;
 mod export;
+mod input;
 mod planner;
 mod query;
 mod show;
@@ -9,8 +10,6 @@ mod submit;
 mod watch;
 
 pub use planner::{PlannerArgs, run as run_planner};
-
-use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -53,17 +52,6 @@ enum StripsCommand {
     Export(export::ExportArgs),
 }
 
-/// Who acts.
-#[derive(Debug, Args)]
-struct Actor {
-    /// Who asks for it.
-    #[arg(long, default_value = "operator")]
-    actor: String,
-    /// Why.
-    #[arg(long, default_value = "")]
-    reason: String,
-}
-
 /// Runs `swath strips`.
 ///
 /// # Errors
@@ -83,23 +71,4 @@ pub fn run_strips(args: &StripsArgs) -> Result<()> {
         StripsCommand::Watch(args) => watch::watch(args),
         StripsCommand::Export(args) => export::export(args),
     }
-}
-
-/// Reads the strips of GeoJSON files; features that are no strips are told on stderr.
-fn read_files(
-    files: &[PathBuf],
-    lengths: swath_mission::orders::geojson::Lengths,
-) -> Result<swath_mission::orders::geojson::Import> {
-    let mut all = swath_mission::orders::geojson::Import::default();
-    for file in files {
-        let import = swath_mission::orders::geojson::import(file, lengths)?;
-        for (feature, reason) in &import.refused {
-            eprintln!("requests {}, feature {feature}: {reason}", file.display());
-        }
-        all.lines += import.lines;
-        all.requests.extend(import.requests);
-        all.cut.extend(import.cut);
-        all.refused.extend(import.refused);
-    }
-    Ok(all)
 }

@@ -11,7 +11,7 @@ use swath_ros::graph;
 use swath_sim::config::SimConfig;
 
 use super::client::{Operator, check};
-use super::read_files;
+use super::input::read_files;
 use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
 use crate::requests::json::status_json;
 use swath_mission::orders::geojson::Lengths;
@@ -19,6 +19,7 @@ use swath_mission::requests::index::Area;
 use swath_mission::requests::lifecycle::State;
 use swath_mission::time_text;
 use swath_node::orders::request_message;
+use swath_node::out;
 
 /// `swath strips preview`.
 #[derive(Debug, Args)]
@@ -30,7 +31,7 @@ pub struct PreviewArgs {
     #[arg(long, conflicts_with = "files")]
     id: Option<u64>,
     /// How far ahead to look [h]; to the mission's end without it.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     hours: Option<f64>,
     /// Print JSON lines.
     #[arg(long)]
@@ -101,7 +102,6 @@ fn parse_area(text: &str) -> Result<Area, String> {
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or a strip would be refused.
-#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
 pub fn preview(args: &PreviewArgs) -> Result<()> {
     let import = read_files(&args.files, Lengths::of(&SimConfig::default()))?;
     let horizon_s = args.hours.map_or(0.0, |hours| hours * 3600.0);
@@ -123,19 +123,24 @@ pub fn preview(args: &PreviewArgs) -> Result<()> {
     for (name, call) in calls {
         let answer = desk.call(call)?;
         refused += usize::from(answer.reason_code != 0);
-        if args.json {
+        let text = if args.json {
             let opportunities: Vec<_> = answer.opportunities.iter().map(opportunity_json).collect();
-            println!(
-                "{}",
-                json!({
-                    "name": name, "opportunities": opportunities,
-                    "reason_code": answer.reason_code, "reason": answer.reason,
-                })
-            );
+            let line = json!({
+                "name": name, "opportunities": opportunities,
+                "reason_code": answer.reason_code, "reason": answer.reason,
+            });
+            format!("{line}\n")
         } else if answer.reason_code != 0 {
-            println!("{name}: {} (reason {})", answer.reason, answer.reason_code);
+            format!("{name}: {} (reason {})\n", answer.reason, answer.reason_code)
+        } else if answer.opportunities.is_empty() {
+            let span =
+                args.hours.map_or("until the mission's end".to_owned(), |hours| format!("in the next {hours} h"));
+            format!("{name}: no chance {span}\n")
         } else {
-            print!("{name}\n{}", opportunity_table(&answer.opportunities));
+            format!("{name}\n{}", opportunity_table(&answer.opportunities))
+        };
+        if !out::print(&text)? {
+            break;
         }
     }
     if refused + import.refused.len() > 0 {
@@ -148,7 +153,6 @@ pub fn preview(args: &PreviewArgs) -> Result<()> {
 ///
 /// # Errors
 /// When nobody answers or a filter is refused.
-#[expect(clippy::print_stdout, reason = "the list is this command's result")]
 pub fn list(args: &ListArgs) -> Result<()> {
     let operator = Operator::start()?;
     let desk = operator.desk(&graph::LIST_STRIPS)?;
@@ -167,23 +171,21 @@ pub fn list(args: &ListArgs) -> Result<()> {
         limit: if args.limit == 0 { 100 } else { args.limit },
         with_requests: false,
     };
-    if !args.json {
-        println!("{}", status_head());
+    if !args.json && !out::print_line(status_head())? {
+        return Ok(());
     }
     loop {
         let page = desk.call(call.clone())?;
         check(page.reason_code, &page.reason)?;
-        for status in &page.strips {
-            if args.json {
-                println!("{}", status_json(status));
-            } else {
-                println!("{}", status_line(status));
-            }
+        let line = |status| if args.json { status_json(status).to_string() } else { status_line(status) };
+        let text: String = page.strips.iter().map(|status| line(status) + "\n").collect();
+        if !out::print(&text)? {
+            return Ok(());
         }
         call.after_id = page.strips.last().map_or(call.after_id, |status| status.strip.id);
         if !page.more || args.limit != 0 {
             if page.more && !args.json {
-                println!("there are more: --after {}", call.after_id);
+                out::print_line(format_args!("there are more: --after {}", call.after_id))?;
             }
             return Ok(());
         }
@@ -194,7 +196,6 @@ pub fn list(args: &ListArgs) -> Result<()> {
 ///
 /// # Errors
 /// When nobody answers or there is no such strip.
-#[expect(clippy::print_stdout, reason = "the report is this command's result")]
 pub fn show(args: &ShowArgs) -> Result<()> {
     let operator = Operator::start()?;
     let call = msg::GetStripRequest {
@@ -205,10 +206,9 @@ pub fn show(args: &ShowArgs) -> Result<()> {
     let answer = operator.desk(&graph::GET_STRIP)?.call(call)?;
     check(answer.reason_code, &answer.reason)?;
     let report = answer.report.first().context("the answer holds no report")?;
-    if args.json {
-        println!("{}", serde_json::to_string_pretty(&report_json(report))?);
-    } else {
-        print!("{}", report_text(report));
-    }
+    out::print(&match args.json {
+        true => serde_json::to_string_pretty(&report_json(report))? + "\n",
+        false => report_text(report),
+    })?;
     Ok(())
 }

@@ -9,10 +9,11 @@ use swath_ros::graph;
 use swath_sim::config::SimConfig;
 
 use super::client::{Operator, check};
+use super::input::{Actor, read_files};
 use super::show::print_result;
-use super::{Actor, read_files};
 use swath_mission::orders::geojson::Lengths;
 use swath_node::orders::request_message;
+use swath_node::out;
 
 /// Requests in one call.
 const BATCH: usize = 500;
@@ -75,11 +76,10 @@ fn lengths(longest_km: f64) -> Result<Lengths> {
     Ok(Lengths { longest_km, ..Lengths::of(&SimConfig::default()) })
 }
 
-/// Submits the strips of files, and reports what became of every line.
+/// Submits the strips of files, and reports what became of every line; all are submitted, also when nobody reads on.
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or something is refused.
-#[expect(clippy::print_stdout, reason = "the report is this command's result")]
 pub fn submit(args: &SubmitArgs) -> Result<()> {
     let mut import = read_files(&args.files, lengths(args.max_length_km)?)?;
     for named in &mut import.requests {
@@ -109,16 +109,16 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
             "lines": lines, "cut": cut, "strips": strips, "accepted": accepted, "refused": refused,
             "features_refused": import.refused.len(),
         });
-        println!("{report}");
+        out::print_line(report)?;
     } else {
         for (name, count) in &import.cut {
-            println!("cut       {name} into {count} strips of equal length");
+            out::print_line(format_args!("cut       {name} into {count} strips of equal length"))?;
         }
-        println!(
+        out::print_line(format_args!(
             "{lines} lines: {} as they are, {} cut into {pieces}; {strips} strips: {accepted} accepted, {refused} refused",
             lines - import.cut.len(),
             import.cut.len(),
-        );
+        ))?;
     }
     match refused + import.refused.len() {
         0 => Ok(()),
