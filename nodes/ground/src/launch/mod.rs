@@ -90,7 +90,8 @@ impl LaunchArgs {
 #[expect(clippy::print_stdout, reason = "the summary is this command's result")]
 pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<()> {
     let mission = args.mission()?;
-    let requests = mission.initial_requests()?;
+    let (requests, faults) = mission.initial_requests()?;
+    faults.iter().for_each(|fault| eprintln!("{fault}"));
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
     let mission_file = output.write_mission(&mission, &requests)?;
     // What is flown is what was written: nodes, in-process missions and re-flights read the same file.

@@ -1,26 +1,32 @@
 //! Requests as tables for people and as JSON for machines.
 
-use anyhow::Result;
+use std::fmt::Display;
+use std::io::Write as _;
+
 use serde_json::{Value, json};
 use swath_msgs::swath_msgs as msg;
 
+use super::files::printable;
 use crate::requests::json::{history_json, state_name, status_json, time, time_json};
 
+/// Prints a line. Returns whether anybody still reads: a pipe that is closed ends the talk, not the work.
+pub fn say(line: &dyn Display) -> bool {
+    writeln!(std::io::stdout().lock(), "{line}").is_ok()
+}
+
 /// Prints what became of a request or of what was asked of it.
-#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
-pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
+pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) {
+    let name = printable(name);
     if as_json {
-        let line = json!({
+        say(&json!({
             "name": name, "accepted": result.accepted, "id": result.id,
             "reason_code": result.reason_code, "reason": result.reason,
-        });
-        println!("{}", serde_json::to_string(&line)?);
+        }));
     } else if result.accepted {
-        println!("{done:<9} {:>7}  {name}", result.id);
+        say(&format!("{done:<9} {:>7}  {name}", result.id));
     } else {
-        println!("refused   {:>7}  {name}: {} (reason {})", "-", result.reason, result.reason_code);
+        say(&format!("refused   {:>7}  {name}: {} (reason {})", "-", printable(&result.reason), result.reason_code));
     }
-    Ok(())
 }
 
 /// Head of a table of requests.
