@@ -195,7 +195,7 @@ impl Summary {
         let mean = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} s"));
         let others: Vec<_> = self.deciders.iter().filter(|(name, _)| **name != self.planner).collect();
         let others = others.iter().map(|(name, count)| format!(", {count} decisions by {name}"));
-        let mut rows = vec[
+        let mut rows = vec![
             ("planner", self.planner.clone() + &others.collect::<String>()),
             ("seed", self.seed.to_string()),
             ("orbits", self.orbits.to_string()),

@@ -153,7 +153,7 @@ impl Recorded {
         let mut messages = self.bag.messages(&Filter { topics, ..Filter::default() })?;
         while let Some(message) = messages.next()? {
             let time = message.log_time;
-            let data = if then == own { message.data.to_vec() } else { adapt(&then, &own, &message.data)? };
+            let data = if then == own { message.data.to_vec() } else { adapt(&then, &own, message.data)? };
             let read = decode(&Cdr::from_bytes(data));
             each(read.with_context(|| format!("{name} at {time} ns"))?)?;
         }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Error, Result, bail};
+use anyhow::{Error, Result, bail};
 use clap::Args;
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::requests::scenario::ScenarioConfig;
@@ -105,7 +105,8 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
     }
-    let requests = mission.initial_requests()?;
+    let (requests, faults) = mission.initial_requests()?;
+    faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
     let flown = fly(args, &mission, &requests, &mut output, policies);
     let Flown { summary, failure } = match flown {

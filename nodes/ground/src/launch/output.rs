@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Error, Result, bail};
 
 use swath_mission::file::{Mission, MissionRequests};
-use swath_mission::orders::geojson;
+use swath_mission::orders::import;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
 
@@ -67,7 +67,7 @@ impl OutputFolder {
 
     /// Writes the mission as it is flown: `mission.toml`, and all its requests in `requests.geojson` beside it.
     pub fn write_mission(&self, mission: &Mission, requests: &[Order]) -> Result<PathBuf> {
-        geojson::write(&self.path.join("requests.geojson"), requests)?;
+        import::write(&self.path.join("requests.geojson"), requests)?;
         let files = vec![PathBuf::from("requests.geojson")];
         let mission = Mission {
             requests: MissionRequests { files, random: None, ..mission.requests.clone() },

@@ -73,7 +73,7 @@ pub fn fly(
         orbits: mission.orbits,
         ticks: flown.end.0,
         wall_seconds: (flown.last - flown.began).as_secs_f64(),
-        requests: mission.initial_requests()?.len() as u64,
+        requests: mission.initial_requests()?.0.len() as u64,
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,

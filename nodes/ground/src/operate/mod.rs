@@ -1,10 +1,12 @@
 //! `swath strips` and `swath planner`: an operator's command line to a flying mission.
 
 mod client;
+mod cover;
 mod export;
-mod input;
+mod files;
 mod planner;
 mod query;
+mod selection;
 mod show;
 mod submit;
 mod watch;
@@ -23,9 +25,14 @@ pub struct StripsArgs {
 
 #[derive(Debug, Subcommand)]
 enum StripsCommand {
-    /// Submit the strips of GeoJSON files; exits with 1 when one of them is refused.
+    /// Submit the lines and areas of files as strips; exits with 1 when one of them is refused.
     #[command(after_help = "Example: swath strips submit examples/requests/rivers.geojson --submitter ops")]
     Submit(submit::SubmitArgs),
+    /// Make strips of the lines and areas of files, without a mission.
+    #[command(after_help = "Examples:
+  swath strips cover examples/requests/flood.geojson --out strips.geojson
+  ogr2ogr -f GeoJSONSeq /vsistdout/ lakes.gpkg | swath strips cover - --heading-deg 10")]
+    Cover(cover::CoverArgs),
     /// Say when strips of a file, or a known one, could be imaged.
     #[command(after_help = "Example: swath strips preview examples/requests/fires.geojson --hours 6")]
     Preview(query::PreviewArgs),
@@ -36,7 +43,7 @@ enum StripsCommand {
     Show(query::ShowArgs),
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
-    /// Replace a strip by the one of a GeoJSON file.
+    /// Replace a strip by the one of a file.
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),
@@ -60,6 +67,7 @@ pub fn run_strips(args: &StripsArgs) -> Result<()> {
     use swath_msgs::swath_msgs::ReviewStripsRequest as Review;
     match &args.command {
         StripsCommand::Submit(args) => submit::submit(args),
+        StripsCommand::Cover(args) => cover::cover(args),
         StripsCommand::Preview(args) => query::preview(args),
         StripsCommand::List(args) => query::list(args),
         StripsCommand::Show(args) => query::show(args),

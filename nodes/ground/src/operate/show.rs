@@ -3,15 +3,14 @@
 use anyhow::Result;
 use serde_json::{Value, json};
 use swath_msgs::swath_msgs as msg;
-
-use swath_mission::time_text;
 use swath_node::out;
-use swath_node::stamp::nanoseconds;
 
+use super::files::printable;
 use crate::requests::json::{history_json, state_name, status_json, time, time_json};
 
 /// Prints what became of a request or of what was asked of it.
 pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
+    let name = printable(name);
     out::print_line(if as_json {
         let line = json!({
             "name": name, "accepted": result.accepted, "id": result.id,
@@ -21,7 +20,7 @@ pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json:
     } else if result.accepted {
         format!("{done:<9} {:>7}  {name}", result.id)
     } else {
-        format!("refused   {:>7}  {name}: {} (reason {})", "-", result.reason, result.reason_code)
+        format!("refused   {:>7}  {name}: {} (reason {})", "-", printable(&result.reason), result.reason_code)
     })?;
     Ok(())
 }
@@ -65,69 +64,25 @@ pub fn opportunity_json(opportunity: &msg::Opportunity) -> Value {
     })
 }
 
-/// Chances as a table; nothing without any.
+/// Chances as a table.
 pub fn opportunity_table(opportunities: &[msg::Opportunity]) -> String {
     let head = format!(
         "  {:<24}  {:<24}  {:>9} {:>9} {:>10}  conflicts\n",
         "window opens", "window closes", "elevation", "acquire", "transition"
     );
-    let times = TickTimes::of(opportunities.iter().flat_map(edges));
     let lines = opportunities.iter().map(|it| {
-        let transition = if it.transition_found { times.duration(it.transition_ticks) } else { "-".to_owned() };
+        let transition = if it.transition_found { format!("{} ticks", it.transition_ticks) } else { "-".to_owned() };
         format!(
-            "  {:<24}  {:<24}  {:>8.1}° {:>9} {:>10}  {}\n",
+            "  {:<24}  {:<24}  {:>8.1}° {:>3} ticks {:>10}  {}\n",
             time(&it.window_open),
             time(&it.window_close),
             it.min_elevation.to_degrees(),
-            times.duration(it.t_acq_ticks),
+            it.t_acq_ticks,
             transition,
             it.conflicts,
         )
     });
-    if opportunities.is_empty() { String::new() } else { std::iter::once(head).chain(lines).collect() }
-}
-
-/// Ticks of a mission as times, from stamps whose ticks are known.
-#[derive(Clone, Copy, Default)]
-struct TickTimes {
-    /// A stamp [ns] with its tick, and the length of a tick [ns].
-    known: Option<(u64, u64, u64)>,
-}
-
-impl TickTimes {
-    fn of(pairs: impl Iterator<Item = (u64, u64)> + Clone) -> Self {
-        let first = pairs.clone().min_by_key(|(_, tick)| *tick);
-        let last = pairs.max_by_key(|(_, tick)| *tick);
-        let known = first.zip(last).and_then(|((from, first), (to, last))| {
-            let ticks = last.checked_sub(first).filter(|ticks| *ticks > 0)?;
-            // A whole number of nanoseconds, whatever the stamps were rounded to.
-            Some((from, first, (to.checked_sub(from)? + ticks / 2) / ticks))
-        });
-        Self { known }
-    }
-
-    /// A number of ticks in seconds; in ticks where nothing tells their length.
-    fn duration(self, ticks: u32) -> String {
-        match self.known {
-            Some((_, _, period)) => format!("{:.1} s", f64::from(ticks) * period as f64 / 1e9),
-            None => format!("{ticks} ticks"),
-        }
-    }
-
-    /// The time of a tick; the tick where nothing tells it.
-    fn at(self, tick: u64) -> String {
-        let time = self.known.and_then(|(from, first, period)| match tick.checked_sub(first) {
-            Some(after) => from.checked_add(after.checked_mul(period)?),
-            None => from.checked_sub((first - tick).checked_mul(period)?),
-        });
-        time.map_or_else(|| format!("tick {tick}"), time_text::format)
-    }
-}
-
-/// Both ends of a window: stamps [ns] with their ticks.
-fn edges(opportunity: &msg::Opportunity) -> [(u64, u64); 2] {
-    let msg::Opportunity { window_open, window_close, window_open_tick, window_close_tick, .. } = opportunity;
-    [(nanoseconds(window_open), *window_open_tick), (nanoseconds(window_close), *window_close_tick)]
+    std::iter::once(head).chain(lines).collect()
 }
 
 fn attempt_state(state: u8) -> &'static str {
@@ -197,25 +152,15 @@ pub fn report_text(report: &msg::StripReport) -> String {
             text += &format!("  {what} strip {id}\n");
         }
     }
-    let status_time = (nanoseconds(&status.header.stamp), status.tick);
-    let history = report.history.iter().map(|entry| (nanoseconds(&entry.stamp), entry.tick));
-    let times =
-        TickTimes::of(report.opportunities.iter().flat_map(edges).chain(history).chain(std::iter::once(status_time)));
     text += "chances\n";
-    text += &match report.opportunities.is_empty() {
-        true => "  none\n".to_owned(),
-        false => opportunity_table(&report.opportunities),
-    };
+    text += &opportunity_table(&report.opportunities);
     text += "attempts\n";
-    if report.attempts.is_empty() {
-        text += "  none\n";
-    }
     for attempt in &report.attempts {
-        let end = if attempt.end_tick == 0 { String::new() } else { format!(" to {}", times.at(attempt.end_tick)) };
         text += &format!(
-            "  task {} from {}{end}: {} {}, attitude error {:.3}, elevation {:.1}°\n",
+            "  task {} ticks {} to {}: {} {}, attitude error {:.3}, elevation {:.1}°\n",
             attempt.task,
-            times.at(attempt.start_tick),
+            attempt.start_tick,
+            attempt.end_tick,
             attempt_state(attempt.state),
             if attempt.reason_code == 0 { String::new() } else { format!("(reason {})", attempt.reason_code) },
             attempt.max_attitude_error,
@@ -234,20 +179,4 @@ pub fn report_text(report: &msg::StripReport) -> String {
         );
     }
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_are_told_as_times() {
-        let start = time_text::parse("2026-01-01T00:00:00Z").unwrap();
-        let times = TickTimes::of([(start + 5_000_000_000, 10), (start + 50_000_000_000, 100)].into_iter());
-        assert_eq!(times.at(0), "2026-01-01T00:00:00Z");
-        assert_eq!(times.at(21), "2026-01-01T00:00:10.500Z");
-        assert_eq!(times.duration(25), "12.5 s");
-        let unknown = TickTimes::of(std::iter::once((start, 7)));
-        assert_eq!((unknown.at(3), unknown.duration(4)), ("tick 3".to_owned(), "4 ticks".to_owned()));
-    }
 }

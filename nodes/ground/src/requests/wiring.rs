@@ -300,7 +300,8 @@ fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
         tracing::info!("{count} requests are taken up from {}, at {at}", store.path().display());
         return Ok(logic);
     }
-    let requests = base.mission.initial_requests()?;
+    let (requests, faults) = base.mission.initial_requests()?;
+    faults.iter().for_each(|fault| tracing::warn!("{fault}"));
     let total = requests.len();
     let accepted = requests.into_iter().filter_map(|order| logic.submit(order, Tick(0)).ok()).count();
     tracing::info!("{accepted} of the {total} strips known from the start are accepted");
