@@ -72,7 +72,7 @@ pub enum SimError {
     Strip(#[from] StripError),
 }
 
-/// Why a strip is refused. Each reason has a stable number that ROS callers get.
+/// Why a strip is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum StripError {
     /// A number that is NaN or infinite.
@@ -134,21 +134,4 @@ pub enum StripError {
         /// How far ahead windows were sought [s].
         horizon_s: f64,
     },
-}
-
-impl StripError {
-    /// Stable number of the reason: the REASON constants of `swath_msgs/msg/StripStatus`.
-    #[must_use]
-    pub fn code(&self) -> u16 {
-        match self {
-            Self::NotFinite { .. } => 100,
-            Self::Latitude { .. } => 101,
-            Self::Longitude { .. } => 102,
-            Self::Priority { .. } => 103,
-            Self::Speed { .. } => 104,
-            Self::Length { .. } => 105,
-            Self::Antipodal => 111,
-            Self::NoWindow { .. } => 110,
-        }
-    }
 }
