@@ -204,6 +204,37 @@ fn the_shield_keeps_the_battery_above_its_floor_and_sends_and_desaturates() {
 }
 
 #[test]
+fn the_observation_of_resources_adds_to_that_of_the_dynamics() {
+    use swath_sim::learn::observation::ObservationSet;
+    let model = model(Profile::Minisat, |_| {});
+    let mut env = episode(&model, 2.0, 31);
+    let mut heuristic = Heuristic { t_pre_s: 80.0 };
+    for _ in 0..20 {
+        env.fly_one(&mut heuristic, env.horizon()).unwrap();
+    }
+    let observe = |set: ObservationSet| {
+        let (mut features, mut mask) = (vec![0.0; 40 * set.features()], vec![false; 40]);
+        env.observe(set, &mut features, &mut mask);
+        features[..set.features()].to_vec()
+    };
+    let (dynamics, resources) = (observe(ObservationSet::Dynamics), observe(ObservationSet::Resources));
+    assert_eq!((dynamics.len(), resources.len()), (22, 38));
+    assert_eq!(dynamics, resources[..22]);
+    let context = env.context();
+    let state = context.situation.resources.unwrap();
+    assert!((f64::from(resources[22]) - state.level()).abs() < 1e-6);
+    assert!((f64::from(resources[23]) - (state.level() - 0.25)).abs() < 1e-6);
+    assert_eq!(f64::from(resources[24]), state.illumination);
+    // The shadow ends after it begins, and so does the contact; the end of either is still to come.
+    assert!(resources[26] > resources[25] && resources[26] > 0.0);
+    assert!(resources[30] > resources[29] && resources[30] > 0.0);
+    assert_eq!(resources[29] <= 0.0, state.in_contact);
+    let sun: f32 = resources[31..34].iter().map(|x| x * x).sum();
+    assert!((sun - 1.0).abs() < 1e-5);
+    assert!(resources[34..].iter().sum::<f32>() > 0.1);
+}
+
+#[test]
 fn duties_need_resources() {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());
     let mut env = episode(&model, 1.0, 1);

@@ -70,6 +70,8 @@ pub struct ResourceState {
     pub storage_bits: u64,
     /// Whether a station heard the satellite at the last tick.
     pub in_contact: bool,
+    /// The time in contact with any station that is under way or comes next: its first tick, and the first one after it.
+    pub contact: Option<(Tick, Tick)>,
     /// Bits sent over the last tick.
     pub sent_bits: u64,
     /// Dipole of the rods over the last tick, in B [A m²].
@@ -110,8 +112,6 @@ pub struct Onboard {
     bits_a_tick: (u64, u64),
     contacts: ContactPlan,
     views: Vec<View>,
-    /// The time in contact that is under way or comes next.
-    contact: Option<(Tick, Tick)>,
     battery: Battery,
     storage: Storage,
     delivered: Vec<ImageFile>,
@@ -163,14 +163,13 @@ impl Onboard {
             bits_a_tick: (bits(config.imager_rate_bps, dt), bits(config.transmitter_rate_bps, dt)),
             views: stations.iter().map(|it| View::new(it, &model.config, model.period)).collect(),
             contacts: ContactPlan::new(stations, &model.config, orbit, model.period),
-            contact: None,
             storage: Storage::new(config.storage_capacity_bits),
             delivered: Vec::new(),
             state: ResourceState::at_epoch(&battery, config.storage_capacity_bits),
             battery,
             config: config.clone(),
         };
-        onboard.contact = onboard.contacts.around(Tick(0)).next(Tick(0));
+        onboard.state.contact = onboard.contacts.around(Tick(0)).next(Tick(0));
         Some(onboard)
     }
 
@@ -268,10 +267,10 @@ impl Onboard {
     }
 
     fn transmit(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState, activity: Activity) {
-        if self.contact.is_some_and(|(_, set)| set <= now) {
-            self.contact = self.contacts.around(now).next(now);
+        if self.state.contact.is_some_and(|(_, set)| set <= now) {
+            self.state.contact = self.contacts.around(now).next(now);
         }
-        self.state.in_contact = self.contact.is_some_and(|(rise, _)| rise <= now);
+        self.state.in_contact = self.state.contact.is_some_and(|(rise, _)| rise <= now);
         self.state.sent_bits = 0;
         if !self.state.in_contact || self.storage.to_send() == 0 || !self.heard(now, r_BN_N, body, activity) {
             return;
@@ -359,6 +358,7 @@ impl ResourceState {
             to_send_bits: 0,
             storage_bits,
             in_contact: false,
+            contact: None,
             sent_bits: 0,
             rod_dipole_B: Vector3::zeros(),
             failure: None,
