@@ -300,6 +300,7 @@ fn play(bag: &Path, rate: f64) -> Value {
         qos_overrides: BTreeMap::new(),
         keys: false,
         acknowledged: Some(LAST_MESSAGES),
+        force: false,
     };
     let player = Player::start(options, &RosArgs::default()).unwrap();
     let summary = player.run(&Shutdown::default(), |_| ()).unwrap();
