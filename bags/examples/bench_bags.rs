@@ -113,7 +113,7 @@ fn measure_cyclone(dir: &Path) -> Value {
     let bag = dir.join("steady");
     let messages: Vec<_> = (0..1024).map(message).collect();
     write(&bag, Compression::Zstd, &messages, RECORDED, 1_000_000_000 / RATE);
-    let mut play = |rate: &str| {
+    let play = |rate: &str| {
         let reader = peer("read");
         let played = last_line(this(&["play", bag.to_str().unwrap(), rate]));
         last_line(reader);
