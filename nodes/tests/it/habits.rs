@@ -138,7 +138,7 @@ fn a_missing_policy_is_told_by_summary_and_exit_code() {
         assert_eq!(output.status.code(), Some(3), "{stderr}");
         assert!(stderr.contains("nowhere.safetensors") && stderr.contains("which was asked for"), "{stderr}");
         let summary = summary(&out);
-        let deciders = summary["deciders"].as_object().unwrap();
+        let deciders = summary["decided_instead"].as_object().unwrap();
         let names: Vec<_> = deciders.keys().collect();
         assert_eq!(names, ["heuristic:90"], "{summary}");
         assert!(deciders["heuristic:90"].as_u64().unwrap() > 0);
