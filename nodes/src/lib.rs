@@ -6,5 +6,5 @@ use swath_mission::guarded::Policies;
 pub const POLICIES: Policies = Policies {
     make: |spec, seed| Ok(swath_training::planners::make(spec, seed)?),
     digest: |spec| Ok(swath_training::planners::digest(spec)?),
-    revision: swath_training::checkpoint::REVISION,
+    revision: swath_training::weights::REVISION,
 };

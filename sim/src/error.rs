@@ -56,6 +56,17 @@ pub enum SimError {
         /// The name given.
         name: String,
     },
+    /// A name that is no station's.
+    #[error("no station `{name}` in the catalogue, which has {known}")]
+    UnknownStation {
+        /// The name given.
+        name: String,
+        /// Names that there are.
+        known: String,
+    },
+    /// A transmitter without anybody who listens.
+    #[error("resources.transmitter_rate_bps is not 0, but there are no stations to send to")]
+    DownlinkWithoutStations,
     /// A strip that cannot be flown.
     #[error(transparent)]
     Strip(#[from] StripError),

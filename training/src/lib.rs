@@ -28,7 +28,7 @@
 //! let folder = tempfile::tempdir()?;
 //! let file = folder.path().join(checkpoint::file_name(&trainer));
 //! checkpoint::save(&trainer, &file)?;
-//! let mut resumed = Trainer::resume(run, &file, Device::Cpu)?;
+//! let mut resumed = checkpoint::resume(run, &file, Device::Cpu)?;
 //! assert_eq!(resumed.advance()?.update, trainer.advance()?.update);
 //! assert!(resumed.is_finished());
 //! # Ok(())
@@ -48,7 +48,6 @@ pub mod evaluate;
 pub mod figures;
 pub mod gae;
 pub mod ground;
-pub mod learn;
 pub mod lock;
 pub mod lookahead;
 pub mod network;
@@ -66,5 +65,6 @@ pub mod strips;
 pub mod tensorboard;
 pub mod toy;
 pub mod trainer;
+pub mod weights;
 
 pub use error::{Result, TrainingError};

@@ -5,20 +5,20 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 use swath_sim::config::SimConfig;
+use swath_sim::learn::hybrid::{decision, wait};
 use swath_sim::learn::observation::{ObservationSet, observe};
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Rationale};
 use tch::{Device, Tensor};
 
-use crate::checkpoint::{self, settings};
 use crate::config::{EnvironmentConfig, RunConfig};
 use crate::distribution::{best_choice, squash};
 use crate::environment::{Action, ObservationShape};
 use crate::error::{Result, TrainingError};
-use crate::learn::{decision, wait};
 use crate::network::Network;
 use crate::parameters::Parameters;
 use crate::rollout::{finite, observations, to_vec};
 use crate::store::Content;
+use crate::weights::{self, settings};
 
 /// Largest file that is read as a policy [bytes]; the paper's own sizes fit.
 const LARGEST_FILE: u64 = 1 << 30;
@@ -84,7 +84,7 @@ impl Policy {
     /// As [`Policy::load`].
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         let content = Content::from_bytes(bytes, path)?;
-        let header = checkpoint::header(&content, path)?;
+        let header = weights::header(&content, path)?;
         let EnvironmentConfig::Strips(strips) = &header.run.environment else {
             return Err(TrainingError::unsuitable(path, "it was not trained on strips"));
         };
@@ -92,7 +92,7 @@ impl Policy {
             ObservationShape { tokens: strips.simulation.planning.candidates, features: strips.observation.features() };
         let longest_s = strips.simulation.planning.t_pre_max_s;
         let (network, layout) = Network::new(&header.run.network, shape, longest_s)?;
-        let weights = checkpoint::flat_weights(&content, &layout, path)?;
+        let weights = weights::flat_weights(&content, &layout, path)?;
         tch::set_num_threads(1);
         Ok(Self {
             parameters: Parameters::from_flat(&layout, Tensor::from_slice(&weights))?,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::checkpoint::REVISION;
+use crate::weights::REVISION;
 
 /// The program, as results name it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

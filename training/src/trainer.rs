@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use tch::Device;
 
 use crate::adam::Adam;
-use crate::checkpoint;
 use crate::config::{EnvironmentConfig, RunConfig, WarmStartConfig};
 use crate::environment::Environment;
 use crate::error::{Result, TrainingError};
@@ -21,6 +20,7 @@ use crate::rollout::{Actor, Course, Discount, Group, Lead, Segment, Slot, SlotSt
 use crate::stop::Stop;
 use crate::strips::Strips;
 use crate::toy::Toy;
+use crate::weights;
 
 /// Random streams of one seed: weights and shuffling, one for each environment, one for each that a teacher leads.
 const STREAM_LEARNER: u64 = 0;
@@ -157,14 +157,12 @@ impl Trainer {
         })
     }
 
-    /// A run as a checkpoint has it.
+    /// Names and shapes of a run's weights.
     ///
     /// # Errors
-    /// As [`checkpoint::load`] and [`Trainer::restore`].
-    pub fn resume(run: RunConfig, path: &Path, device: Device) -> Result<Self> {
-        let (_, layout, _) = build(&run)?;
-        let state = checkpoint::load(path, &run, &layout)?;
-        Self::restore(run, device, state)
+    /// As [`Trainer::new`].
+    pub fn layout_of(run: &RunConfig) -> Result<Layout> {
+        build(run).map(|(_, layout, _)| layout)
     }
 
     /// Takes the weights of a policy or checkpoint of the same network and observation, and nothing else of it.
@@ -172,7 +170,7 @@ impl Trainer {
     /// # Errors
     /// A file that is damaged or holds another network or observation.
     pub fn adopt(&mut self, path: &Path) -> Result<()> {
-        let weights = checkpoint::load_weights(path, &self.run, &self.layout)?;
+        let weights = weights::load_weights(path, &self.run, &self.layout)?;
         let flat = tch::Tensor::from_slice(&weights).to_device(self.parameters.flat.device());
         self.parameters = Parameters::from_flat(&self.layout, flat)?;
         Ok(())

@@ -9,6 +9,7 @@ use swath_training::config::RunConfig;
 use swath_training::stop::Stop;
 use swath_training::store::Content;
 use swath_training::trainer::Trainer;
+use swath_training::weights;
 use tch::Device;
 
 const TOY: &str = r#"
@@ -70,7 +71,7 @@ fn resumed_equals_uninterrupted(text: &str) {
         advance(&mut whole, 2);
         checkpoint::save(&whole, &path).unwrap();
         advance(&mut whole, 3);
-        let mut resumed = Trainer::resume(run(text), &path, Device::Cpu).unwrap();
+        let mut resumed = checkpoint::resume(run(text), &path, Device::Cpu).unwrap();
         advance(&mut resumed, 3);
         assert_eq!(whole.steps(), resumed.steps());
         assert_eq!(bytes(&whole, folder.path()), bytes(&resumed, folder.path()));
@@ -97,7 +98,7 @@ fn a_warm_start_resumed_anywhere_is_bit_equal() {
             let mut trainer = Trainer::new(run(), Device::Cpu).unwrap();
             (0..begun).for_each(|_| assert!(trainer.lesson().unwrap().is_some()));
             checkpoint::save(&trainer, &path).unwrap();
-            let mut resumed = Trainer::resume(run(), &path, Device::Cpu).unwrap();
+            let mut resumed = checkpoint::resume(run(), &path, Device::Cpu).unwrap();
             assert_eq!(resumed.lessons_shown(), trainer.lessons_shown());
             assert_eq!(resumed.lessons_shown().is_none(), begun == lessons);
             let left = std::iter::from_fn(|| resumed.lesson().unwrap()).count();
@@ -137,7 +138,7 @@ fn a_checkpoint_within_a_warm_start_is_not_taken_for_its_end() {
     let mut trainer = Trainer::new(run(&text), Device::Cpu).unwrap();
     trainer.lesson().unwrap();
     checkpoint::save(&trainer, &path).unwrap();
-    let version = |path: &Path| checkpoint::header(&Content::read(path).unwrap(), path).unwrap().version;
+    let version = |path: &Path| weights::header(&Content::read(path).unwrap(), path).unwrap().version;
     assert_eq!((version(&path), checkpoint::file_name(&trainer).as_str()), (2, "lesson-000000000060.safetensors"));
     checkpoint::save_policy(&trainer, &path).unwrap();
     assert_eq!(version(&path), 1, "a policy is a policy");
@@ -191,7 +192,7 @@ fn a_checkpoint_of_another_run_is_refused_with_the_setting_that_differs() {
     let refused = |change: fn(&mut RunConfig)| {
         let mut run = run(TOY);
         change(&mut run);
-        Trainer::resume(run, &path, Device::Cpu).map(|_| ())
+        checkpoint::resume(run, &path, Device::Cpu).map(|_| ())
     };
     let error = refused(|run| run.ppo.clip = 0.3).unwrap_err();
     let TrainingError::Mismatch { key, found, wanted, .. } = error else {
@@ -213,7 +214,7 @@ fn damaged_and_missing_checkpoints_are_refused_by_name() {
     checkpoint::save(&trainer, &path).unwrap();
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
-    let refused = || Trainer::resume(run(TOY), &path, Device::Cpu).map(|_| ()).unwrap_err();
+    let refused = || checkpoint::resume(run(TOY), &path, Device::Cpu).map(|_| ()).unwrap_err();
     assert!(refused().to_string().contains("cut.safetensors is damaged"));
     checkpoint::save_policy(&trainer, &path).unwrap();
     assert!(refused().to_string().contains("it is a policy"));

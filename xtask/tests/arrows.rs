@@ -1,8 +1,12 @@
-//! Keeps the crates' dependencies pointing one way, as ARCHITECTURE.md draws them.
+//! Keeps arrows pointing one way, as ARCHITECTURE.md draws them: between crates, between the folders of `sim`, and
+//! between files, which never import each other in a circle.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+mod imports;
+
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
@@ -49,14 +53,92 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("xtask", &["tch", "torch-sys", "ros2-client", "rustdds"]),
 ];
 
-fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+/// Each room of `sim`, and the rooms that it may know.
+const ROOMS: &[(&str, &[&str])] = &[
+    ("error", &[]),
+    ("rng", &[]),
+    ("time", &["error"]),
+    ("config", &["error", "time"]),
+    ("world", &["config", "error", "time"]),
+    ("task", &["time", "world"]),
+    ("vehicle", &["config", "error", "model", "rng", "task", "time", "world"]),
+    ("model", &["config", "error", "time", "vehicle", "world"]),
+    ("requests", &["config", "error", "model", "rng", "time", "world"]),
+    ("planner", &["model", "requests", "rng", "task", "time", "vehicle", "world"]),
+    ("mission", &["model", "planner", "requests", "task", "time", "vehicle"]),
+    (
+        "learn",
+        &["config", "error", "mission", "model", "planner", "requests", "rng", "task", "time", "vehicle", "world"],
+    ),
+    ("foresight", &["learn", "model", "planner", "requests", "time", "vehicle", "world"]),
+];
+
+/// Crates that still have circles.
+const UNTANGLED_NEXT: &[&str] = &["nodes/ros/src", "nodes/ground/src"];
+
+/// The source folders of all crates.
+fn sources() -> Vec<PathBuf> {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    metadata()["packages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|package| Path::new(package["manifest_path"].as_str().unwrap()).with_file_name("src"))
+        .inspect(|source| assert!(source.starts_with(root.canonicalize().unwrap()), "{source:?}"))
+        .collect()
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let sources = sources();
+    assert!(sources.len() > 8, "{sources:?}");
+    let mut circles = Vec::new();
+    for source in sources.iter().filter(|it| !UNTANGLED_NEXT.iter().any(|next| it.ends_with(next))) {
+        let arrows = imports::arrows(source);
+        for circle in imports::circles(&arrows) {
+            let inside = |file: &String| circle.contains(file);
+            for from in &circle {
+                for (to, names) in arrows[from].iter().filter(|(to, _)| inside(to)) {
+                    circles.push(format!("{}: {from} -> {to}: {names:?}", source.display()));
+                }
+            }
+            circles.push(String::new());
+        }
+    }
+    assert!(circles.is_empty(), "files import each other in circles:\n{}", circles.join("\n"));
+}
+
+#[test]
+fn rooms_of_sim_know_only_what_the_architecture_allows() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sim/src");
+    let room = |file: &str| file.split_once('/').map_or(file.trim_end_matches(".rs"), |(room, _)| room).to_owned();
+    let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (from, to) in imports::arrows(&source) {
+        let known = found.entry(room(&from)).or_default();
+        known.extend(to.keys().map(|file| room(file)).filter(|it| *it != room(&from)));
+    }
+    let allowed: BTreeMap<String, BTreeSet<String>> = ROOMS
+        .iter()
+        .map(|(name, known)| ((*name).to_owned(), known.iter().map(|it| (*it).to_owned()).collect()))
+        .collect();
+    for (name, known) in &found {
+        let extra: Vec<_> = known.difference(allowed.get(name).unwrap_or(&BTreeSet::new())).cloned().collect();
+        assert!(extra.is_empty(), "{name} must not know {extra:?}\n{found:#?}");
+    }
+}
+
+fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1"])
         .args(["--manifest-path", concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml")])
         .output()
         .unwrap();
     assert!(output.status.success(), "{output:?}");
-    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    let metadata = metadata();
     let text = |value: &Value| value.as_str().unwrap().to_owned();
     metadata["packages"]
         .as_array()

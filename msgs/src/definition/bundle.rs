@@ -1,15 +1,6 @@
 //! Texts of several definitions, as bags carry them: the type's own, then its dependencies behind lines of `=`.
 
-use super::{Base, Definition, DefinitionError, Field, Primitive, Shape, idl, message, parts};
-
-/// A definition under its name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Named {
-    /// `package/Name`.
-    pub name: String,
-    /// What it is.
-    pub definition: Definition,
-}
+use super::{Base, Definition, DefinitionError, Field, Named, Primitive, Shape, idl, message, parts};
 
 /// Part of a bundle: the definitions of one file.
 struct Section {

@@ -8,7 +8,7 @@ mod idl;
 
 use std::fmt;
 
-pub use bundle::{Named, definitions};
+pub use bundle::definitions;
 
 /// A type that is not made of others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,6 +121,15 @@ pub struct Definition {
     pub fields: Vec<Field>,
     /// Its constants, in order.
     pub constants: Vec<Constant>,
+}
+
+/// A definition under its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Named {
+    /// `package/Name`.
+    pub name: String,
+    /// What it is.
+    pub definition: Definition,
 }
 
 /// What is wrong with a definition, and where.

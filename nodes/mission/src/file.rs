@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
+use swath_sim::config::resources::ResourcesConfig;
 use swath_sim::error::SimError;
 use swath_sim::mission::horizon;
 use swath_sim::model::Model;
@@ -15,6 +16,7 @@ use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::spacecraft::Spacecraft;
+use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
@@ -97,6 +99,10 @@ pub struct Mission {
     pub initial: Option<InitialState>,
     /// Physics and the planning problem.
     pub sim: SimConfig,
+    /// Power, data and momentum of the satellite, a shorter way to write `[sim.resources]`; reading a mission puts it
+    /// there.
+    #[serde(skip_serializing)]
+    pub resources: Option<Box<ResourcesConfig>>,
     /// How the satellite that is flown differs from what guidance and planner believe of it.
     #[serde(skip_serializing_if = "is_exact")]
     pub plant: PlantErrors,
@@ -143,6 +149,7 @@ impl Default for Mission {
             hold_s: 10.0,
             initial: None,
             sim: SimConfig::default(),
+            resources: None,
             plant: PlantErrors::default(),
         }
     }
@@ -163,8 +170,18 @@ impl Mission {
         for file in &mut mission.requests.files {
             *file = folder.join(&*file);
         }
+        mission.sim.resources = mission.resources.take().or(mission.sim.resources);
         mission.validate()?;
         Ok(mission)
+    }
+
+    /// Stations of the mission that its orbit never sees.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn stations_never_seen(&self) -> Result<Vec<NeverSeen>, MissionError> {
+        let model = self.model()?;
+        Ok(model.stations.iter().filter_map(|station| station.never_seen(&model.config)).collect())
     }
 
     /// Checks every setting's range.
@@ -300,6 +317,30 @@ mod tests {
     fn a_mission_survives_its_own_text() {
         let mission = Mission { seed: 7, ..Mission::default() }.resolved();
         assert_eq!(parse(&toml::to_string(&mission).unwrap()), Ok(mission));
+    }
+
+    #[test]
+    fn resources_are_read_with_their_profile_and_stations_never_seen_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mission.toml");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            Mission::read(&path).map_err(|error| error.to_string())
+        };
+        let mission = read("[resources]\nbus_w = 55.0\nstations = [\"boulder\", \"svalbard\"]").unwrap();
+        let resources = mission.sim.resources.clone().unwrap();
+        assert_eq!((resources.bus_w, resources.panel_area_m2), (55.0, 1.18));
+        let unseen: Vec<String> = mission.stations_never_seen().unwrap().iter().map(ToString::to_string).collect();
+        assert_eq!(unseen.len(), 1);
+        assert!(unseen[0].starts_with("station svalbard at latitude 78.2° never sees"), "{unseen:?}");
+        // What is resolved says it once, and is the same mission.
+        let text = toml::to_string(&mission).unwrap();
+        assert!(text.contains("[sim.resources]") && !text.contains("\n[resources]"), "{text}");
+        assert_eq!(read(&text), Ok(mission));
+        let error = read("[resources]\npanel_efficiency = 1.5").unwrap_err();
+        assert_eq!(error, "mission setting resources.panel_efficiency is 1.5, outside 0 to 1");
+        let error = read("[resources]\nstations = []").unwrap_err();
+        assert!(error.contains("no stations to send to"), "{error}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What a mission leaves behind beside its bag: a line a task, and a summary.
 
 use serde::{Deserialize, Serialize};
+use swath_sim::mission::Delivered;
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
@@ -103,6 +104,20 @@ pub struct Summary {
     pub messages_recorded: u64,
     /// Processes that flew the mission.
     pub nodes: Vec<NodeProcess>,
+    /// What came to the ground and what was left, in a mission with `[resources]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resources: Option<ResourcesSummary>,
+}
+
+/// What came to the ground, and how power and data stood at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResourcesSummary {
+    /// Images that came to the ground, their priorities, and failures of battery or wheels.
+    pub delivered: Delivered,
+    /// Charge over capacity at the end.
+    pub battery_level: f64,
+    /// Bits stored at the end.
+    pub stored_bits: u64,
 }
 
 /// What a summary takes from outside the totals.
@@ -126,6 +141,8 @@ pub struct SummaryInputs {
     pub messages_recorded: u64,
     /// Processes.
     pub nodes: Vec<NodeProcess>,
+    /// What came to the ground and what was left.
+    pub resources: Option<ResourcesSummary>,
 }
 
 impl Summary {
@@ -154,6 +171,7 @@ impl Summary {
             wait_s: seconds(totals.wait_ticks),
             messages_recorded: inputs.messages_recorded,
             nodes: inputs.nodes,
+            resources: inputs.resources,
         }
     }
 
@@ -161,7 +179,7 @@ impl Summary {
     #[must_use]
     pub fn table(&self) -> String {
         let mean = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} s"));
-        let rows = [
+        let mut rows = vec![
             ("planner", self.planner.clone()),
             ("seed", self.seed.to_string()),
             ("orbits", self.orbits.to_string()),
@@ -177,6 +195,15 @@ impl Summary {
             ("waited", format!("{:.0} s", self.wait_s)),
             ("messages recorded", self.messages_recorded.to_string()),
         ];
+        if let Some(ResourcesSummary { delivered, battery_level, stored_bits }) = &self.resources {
+            rows.extend([
+                ("strips delivered", delivered.strips.to_string()),
+                ("delivered reward", format!("{:.2}", delivered.reward)),
+                ("failures", delivered.failures.to_string()),
+                ("battery at the end", format!("{:.1} %", battery_level * 100.0)),
+                ("stored at the end", format!("{:.3} Gbit", *stored_bits as f64 / 1e9)),
+            ]);
+        }
         let lines = rows.iter().map(|(name, value)| format!("  {name:<20} {value}\n"));
         lines.collect()
     }

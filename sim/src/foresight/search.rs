@@ -48,6 +48,25 @@ const PRIOR_RATE: f64 = 0.5 / 200.0;
 /// wider the beam, the better the plan, at a time in proportion. (Taking parts of the plan out and seeking them anew with
 /// a wider beam, a large-neighbourhood search, found next to nothing for the time that makes this beam three times
 /// wider.)
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use swath_sim::config::SimConfig;
+/// use swath_sim::foresight::{CANDIDATES, GroundSettings, plan, upper_bound};
+/// use swath_sim::learn::episode::{Env, EpisodeConfig};
+/// use swath_sim::model::Model;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut config = SimConfig::default();
+/// config.planning.candidates = CANDIDATES;
+/// let episode = EpisodeConfig { orbits: 0.1, ..EpisodeConfig::default() };
+/// let env = Env::episode(Arc::new(Model::new(config)?), &episode, 7);
+/// let best = plan(&env, &GroundSettings { width: 1, branches: 3, ..GroundSettings::default() });
+/// assert!(!best.tasks.is_empty() && best.reward < upper_bound(&env));
+/// # Ok(())
+/// # }
+/// ```
 #[must_use]
 pub fn plan(env: &Env, settings: &GroundSettings) -> Plan {
     let mut ground = Ground::new(env, settings);

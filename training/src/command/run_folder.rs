@@ -5,12 +5,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use swath_training::checkpoint::{self, REVISION};
+use swath_training::checkpoint;
 use swath_training::config::RunConfig;
 use swath_training::lock::RunLock;
 use swath_training::program::Program;
 use swath_training::store::{self, Content};
 use swath_training::trainer::Trainer;
+use swath_training::weights::{self, REVISION};
 use tch::Device;
 
 use super::output::say;
@@ -58,13 +59,13 @@ impl RunFolder {
         let folder = Self::take(path.clone())?;
         // Whoever held the folder until now may have saved and removed some.
         let checkpoint = find()?;
-        let trainer = Trainer::resume(run, &checkpoint, device)?;
+        let trainer = checkpoint::resume(run, &checkpoint, device)?;
         let at = match trainer.lessons_shown() {
             Some(shown) => format!("within the warm start, after {shown} decisions"),
             None => format!("at step {}", trainer.steps()),
         };
         say(&format!("going on from {} {at}", checkpoint.display()));
-        let revision = checkpoint::header(&Content::read(&checkpoint)?, &checkpoint)?.revision;
+        let revision = weights::header(&Content::read(&checkpoint)?, &checkpoint)?.revision;
         if revision != REVISION {
             say(&format!("warning: it was made by revision {revision}, this is {REVISION}: going on may not be exact"));
         }

@@ -8,7 +8,7 @@ mod progress;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::requests::scenario::ScenarioConfig;
@@ -90,6 +90,12 @@ impl LaunchArgs {
 #[expect(clippy::print_stdout, reason = "the summary is this command's result")]
 pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<()> {
     let mission = args.mission()?;
+    if mission.sim.resources.is_some() && !args.in_process {
+        bail!("a mission with [resources] flies in one process only: add --in-process");
+    }
+    for unseen in mission.stations_never_seen()? {
+        tracing::warn!("{unseen}");
+    }
     let (requests, faults) = mission.initial_requests()?;
     faults.iter().for_each(|fault| eprintln!("{fault}"));
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
@@ -143,6 +149,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         wall_seconds: started.elapsed().as_secs_f64(),
         requests: requested as u64,
         accepted: accepted as u64,
+        resources: flight.resources(),
         ..SummaryInputs::default()
     };
     Ok(Summary::new(inputs, &totals, period))

@@ -64,6 +64,7 @@ pub fn fly(
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,
+        resources: None,
     };
     Ok(Summary::new(inputs, &flown.totals, model.period))
 }

@@ -1,0 +1,15 @@
+//! Tests of the programs of this suite, from outside: processes, topics, files.
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+mod bad_input;
+mod bag;
+mod clients;
+mod common;
+mod examples;
+mod killed;
+mod operators_day;
+mod parity;
+mod peer;
+mod pins;
+mod readme;
+mod recorded;

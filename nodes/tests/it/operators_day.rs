@@ -1,0 +1,161 @@
+//! An operator's day, as `docs/operators-day.md` tells it: every command there is run here over DDS.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::common;
+
+struct Day {
+    domain: String,
+    out: std::path::PathBuf,
+}
+
+impl Day {
+    fn swath(&self, words: &str) -> String {
+        common::succeed(&mut self.command(words))
+    }
+
+    fn refused(&self, words: &str) -> String {
+        common::fail(&mut self.command(words))
+    }
+
+    fn command(&self, words: &str) -> std::process::Command {
+        let mut command = common::command("swath", &self.domain);
+        command.args(words.split_whitespace()).current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
+        command
+    }
+
+    fn json(&self, words: &str) -> Vec<Value> {
+        common::json_lines(&self.swath(&format!("{words} --json")))
+    }
+
+    fn show(&self, id: u64) -> Value {
+        serde_json::from_str(&self.swath(&format!("strips show {id} --json"))).unwrap()
+    }
+
+    fn id_of(&self, name: &str) -> u64 {
+        let strips = self.json("strips list --limit 0");
+        strips.iter().find(|strip| strip["name"] == name).unwrap()["id"].as_u64().unwrap()
+    }
+}
+
+/// The commands that the document shows, in order, without their leading `swath`.
+fn documented() -> Vec<String> {
+    let document = include_str!("../../../docs/operators-day.md");
+    document.lines().filter_map(|line| line.strip_prefix("$ swath ")).map(str::to_owned).collect()
+}
+
+#[test]
+fn an_operators_day() {
+    let folder = tempfile::tempdir().unwrap();
+    let day = Day { domain: common::domain(), out: folder.path().join("day") };
+    let documented = documented();
+    let mut done = Vec::new();
+    let mut note = |words: &str| done.push(words.to_owned());
+
+    let launch = "launch examples/missions/operators_day.toml";
+    note(launch);
+    let mut flight = common::Running::start(day.command(launch).arg("--out").arg(&day.out));
+
+    note("strips submit examples/requests/rivers.geojson --submitter floods");
+    let rivers = common::until("the request manager", || {
+        let output = common::run(&mut day.command("strips submit examples/requests/rivers.geojson --submitter floods"));
+        output.status.success().then(|| String::from_utf8(output.stdout).unwrap())
+    });
+    assert!(rivers.contains("accepted") && rivers.contains(" 0 refused"), "{rivers}");
+
+    note("strips preview examples/requests/fires.geojson --hours 12");
+    let preview = day.swath("strips preview examples/requests/fires.geojson --hours 12");
+    assert!(preview.contains("window opens"), "{preview}");
+
+    note("strips list --state accepted --area -60,75,-180,180");
+    assert!(day.swath("strips list --state accepted --area -60,75,-180,180").contains("accepted"));
+
+    note("strips watch --count 3");
+    assert_eq!(day.swath("strips watch --count 3").lines().count(), 3);
+
+    note("strips submit examples/requests/faults.geojson --submitter geology --hold");
+    day.swath("strips submit examples/requests/faults.geojson --submitter geology --hold");
+    let held: Vec<_> =
+        day.json("strips list --state held").into_iter().filter(|strip| strip["linked_to"] == 0).collect();
+    let [first, second, ..] = &held[..] else { panic!("nothing is held: {held:?}") };
+    let (first, second) = (first["id"].as_u64().unwrap(), second["id"].as_u64().unwrap());
+    note("strips release 1021 --reason \"crew is on site\"");
+    day.swath(&format!("strips release {first}"));
+    note("strips cancel 1022 --reason \"cloud\"");
+    day.swath(&format!("strips cancel {second} --reason cloud"));
+    assert!(day.refused(&format!("strips cancel {second}")).contains("1 of 1 were refused"));
+    assert_eq!(day.show(second)["status"]["state"], "cancelled by user");
+
+    note("strips replace 1021 examples/requests/replacement.geojson");
+    day.swath(&format!("strips replace {first} examples/requests/replacement.geojson"));
+    let new = day.id_of("San Andreas, closer look");
+    note("strips show 1030");
+    let report = day.show(new);
+    assert_eq!(report["status"]["supersedes"], first, "{report}");
+    let history: Vec<_> =
+        report["history"].as_array().unwrap().iter().map(|it| it["state"].as_str().unwrap()).collect();
+    assert_eq!(history[..2], ["held", "accepted"], "{report}");
+    assert!(history.contains(&"superseded"), "{report}");
+
+    note("planner mode hold");
+    day.swath("planner mode hold");
+    note("planner mode approve");
+    day.swath("planner mode approve");
+    note("planner status");
+    let proposed = |day: &Day| {
+        common::until("a proposal", || {
+            day.json("planner status").into_iter().find(|status| status["proposal_state"] == "open")
+        })
+    };
+    note("planner approve 3");
+    // A proposal is withdrawn when its window closes before the operator has looked at it.
+    let mut approved = std::collections::BTreeSet::new();
+    common::until("an approved attempt", || {
+        let proposal = proposed(&day);
+        let number = &proposal["proposal"];
+        if common::run(&mut day.command(&format!("planner approve {number}"))).status.success() {
+            approved.insert(proposal["strip"].as_u64().unwrap());
+        }
+        let scheduled =
+            |strip: u64| day.show(strip)["history"].as_array().unwrap().iter().any(|it| it["state"] == "scheduled");
+        approved.iter().any(|&strip| scheduled(strip)).then_some(())
+    });
+    note("planner reject");
+    proposed(&day);
+    day.swath("planner reject");
+    note("planner mode autonomous");
+    day.swath("planner mode autonomous");
+
+    // The planner of this mission allows too little time for its slews, so that some attempts fail.
+    note("strips list --json --limit 0");
+    let failed = common::until("a failure", || {
+        let strips = day.json("strips list --limit 0");
+        strips.into_iter().find(|strip| [201, 202].map(Value::from).contains(&strip["reason_code"]))
+    });
+    let report = day.show(failed["id"].as_u64().unwrap());
+    assert!(report["attempts"].as_array().unwrap().iter().any(|it| it["state"] == "failed"), "{report}");
+
+    note("strips export --trail --out trail.jsonl");
+    let trail = folder.path().join("trail.jsonl");
+    day.swath(&format!("strips export --trail --out {}", trail.display()));
+    let trail = common::json_lines(&std::fs::read_to_string(trail).unwrap());
+    assert!((1..).zip(&trail).all(|(sequence, line): (u64, _)| line["sequence"] == sequence));
+    let states: std::collections::BTreeSet<_> = trail.iter().map(|line| line["state"].as_str().unwrap()).collect();
+    for state in ["accepted", "held", "cancelled by user", "superseded", "scheduled", "executing"] {
+        assert!(states.contains(state), "{state}: {states:?}");
+    }
+    flight.stop();
+    note("strips export --store out/operators-day-7-1/requests.sqlite --out strips.geojson");
+    let store = day.out.join("requests.sqlite");
+    let geojson: Value =
+        serde_json::from_str(&day.swath(&format!("strips export --store {}", store.display()))).unwrap();
+    let features = geojson["features"].as_array().unwrap();
+    assert!(features.iter().any(|it| it["properties"]["state"] == "cancelled by user"));
+    assert!(features.iter().all(|it| !it["properties"]["history"].as_array().unwrap().is_empty()));
+    let words = |words: &str| words.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>();
+    let (shown, flown): (Vec<_>, Vec<_>) =
+        (documented.iter().map(|it| words(it)).collect(), done.iter().map(|it| words(it)).collect());
+    assert_eq!(shown, flown, "docs/operators-day.md and this test show the same commands in the same order");
+}
