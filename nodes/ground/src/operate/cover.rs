@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 
-use super::files::{CuttingArgs, cut_json, cut_text, read_files, write_file};
+use super::files::{CuttingArgs, Files, cut_json, cut_text, write_file};
 
 /// `swath strips cover`.
 #[derive(Debug, Args)]
@@ -29,7 +29,8 @@ pub struct CoverArgs {
 /// When a file cannot be used, the strips cannot be written, or something is no strip.
 #[expect(clippy::print_stdout, reason = "the report is this command's result")]
 pub fn cover(args: &CoverArgs) -> Result<()> {
-    let import = read_files(&args.files, &args.cutting.usual()?)?;
+    let cutting = args.cutting.usual()?;
+    let import = Files::read(&args.files)?.cut(&cutting);
     if let Some(path) = &args.out {
         write_file(path, &import)?;
     }

@@ -16,16 +16,16 @@ pub fn say(line: &dyn Display) -> bool {
 
 /// Prints what became of a request or of what was asked of it.
 pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) {
-    let name = printable(name);
     if as_json {
         say(&json!({
             "name": name, "accepted": result.accepted, "id": result.id,
             "reason_code": result.reason_code, "reason": result.reason,
         }));
     } else if result.accepted {
-        say(&format!("{done:<9} {:>7}  {name}", result.id));
+        say(&format!("{done:<9} {:>7}  {}", result.id, printable(name)));
     } else {
-        say(&format!("refused   {:>7}  {name}: {} (reason {})", "-", printable(&result.reason), result.reason_code));
+        let (name, reason) = (printable(name), printable(&result.reason));
+        say(&format!("refused   {:>7}  {name}: {reason} (reason {})", "-", result.reason_code));
     }
 }
 
