@@ -20,7 +20,7 @@ const BATCH: usize = 500;
 /// `swath strips submit`.
 #[derive(Debug, Args)]
 pub struct SubmitArgs {
-    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT, CSV or shapefiles.
+    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT or CSV.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Who submits.
