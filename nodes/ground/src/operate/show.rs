@@ -10,7 +10,6 @@ use crate::requests::json::{history_json, state_name, status_json, time, time_js
 
 /// Prints what became of a request or of what was asked of it.
 pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
-    let name = printable(name);
     out::print_line(if as_json {
         let line = json!({
             "name": name, "accepted": result.accepted, "id": result.id,
@@ -18,9 +17,10 @@ pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json:
         });
         line.to_string()
     } else if result.accepted {
-        format!("{done:<9} {:>7}  {name}", result.id)
+        format!("{done:<9} {:>7}  {}", result.id, printable(name))
     } else {
-        format!("refused   {:>7}  {name}: {} (reason {})", "-", printable(&result.reason), result.reason_code)
+        let (name, reason) = (printable(name), printable(&result.reason));
+        format!("refused   {:>7}  {name}: {reason} (reason {})", "-", result.reason_code)
     })?;
     Ok(())
 }

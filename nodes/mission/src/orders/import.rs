@@ -129,6 +129,14 @@ const NAMES: [&str; 4] = ["name", "Name", "NAME", "title"];
 /// # Errors
 /// When the file as a whole cannot be read.
 pub fn import(path: &Path, cutting: &Cutting) -> Result<Import, RequestsFileError> {
+    Ok(import_features(features(path)?, path, cutting))
+}
+
+/// Reads the features of a file, `-` for standard input, as they are.
+///
+/// # Errors
+/// When the file as a whole cannot be read.
+pub fn features(path: &Path) -> Result<formats::Features, RequestsFileError> {
     let unreadable = |source| RequestsFileError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     let limit = LIMIT_MB * 1_000_000 + 1;
@@ -141,9 +149,7 @@ pub fn import(path: &Path, cutting: &Cutting) -> Result<Import, RequestsFileErro
     if bytes.len() as u64 >= limit {
         return Err(RequestsFileError::TooLarge { path: path.to_owned() });
     }
-    let features = formats::read(&bytes, path);
-    let features = features.map_err(|why| RequestsFileError::Format { path: path.to_owned(), why })?;
-    Ok(import_features(features, path, cutting))
+    formats::read(&bytes, path).map_err(|why| RequestsFileError::Format { path: path.to_owned(), why })
 }
 
 /// Makes orders of a file's features.

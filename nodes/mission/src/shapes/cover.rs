@@ -53,6 +53,8 @@ pub enum CoverError {
 
 /// Greatest distance of a point from the middle of its area [rad].
 const RADIUS_MAX: f64 = 70.0 / 180.0 * std::f64::consts::PI;
+/// Distance of a point from the middle of an area beyond which few directions are tried [rad].
+const LARGE: f64 = 0.25;
 /// Directions that are tried.
 const HEADINGS: u32 = 18;
 /// Points at which what is shown is counted, about.
@@ -67,7 +69,8 @@ const CUTS_MAX: f64 = 10_000.0;
 pub fn cover(polygons: &[Polygon], swath: &Swath) -> Result<Cover, CoverError> {
     let points = || polygons.iter().flatten().flatten();
     let middle = points().sum::<Vector3<f64>>().try_normalize(1e-9).ok_or(CoverError::Empty)?;
-    if points().any(|point| angle(&middle, point) > RADIUS_MAX) {
+    let radius = points().map(|point| angle(&middle, point)).fold(0.0, f64::max);
+    if radius > RADIUS_MAX {
         return Err(CoverError::TooLarge);
     }
     let lay = |along: Vector3<f64>| Layout::new(polygons, middle, along, swath);
@@ -77,7 +80,9 @@ pub fn cover(polygons: &[Polygon], swath: &Swath) -> Result<Cover, CoverError> {
             // From a direction of the area's own, so that it is covered alike wherever it lies.
             let far = points().max_by(|a, b| angle(&middle, a).total_cmp(&angle(&middle, b)));
             let far = far.and_then(|far| tangent(&middle, far)).ok_or(CoverError::Empty)?;
-            let turns = (0..HEADINGS).map(|i| std::f64::consts::PI * f64::from(i) / f64::from(HEADINGS));
+            // Where most strips are of full length, the direction changes little.
+            let count = if radius > LARGE { 2 } else { HEADINGS };
+            let turns = (0..count).map(|i| std::f64::consts::PI * f64::from(i) / f64::from(count));
             let directions = turns.map(|turn| turned(&middle, far, turn)).chain(longer_axis(polygons, &middle, &far));
             let cost = |layout: &Layout| {
                 let rows = layout.rows(swath);

@@ -1,10 +1,9 @@
-//! Files as they come: GeoJSON, text sequences of it, KML, GPX, WKT, CSV and shapefiles, told apart by what is in them.
+//! Files as they come: GeoJSON, text sequences of it, KML, GPX, WKT and CSV, told apart by what is in them.
 
 mod csv;
 mod geojson;
 mod gpx;
 mod kml;
-mod shapefile;
 mod wkt;
 
 use std::path::Path;
@@ -43,12 +42,13 @@ pub enum FormatError {
         format: &'static str,
     },
     /// Nobody knows what it is.
-    #[error("is of no format that is known: GeoJSON, KML, GPX, WKT, CSV and shapefiles are read")]
+    #[error("is of no format that is known: GeoJSON, KML, GPX, WKT and CSV are read")]
     Unknown,
 }
 
 /// How the files of formats that are not read begin.
-const UNREAD: [(&[u8], &str); 5] = [
+const UNREAD: [(&[u8], &str); 6] = [
+    (b"\x00\x00\x27\x0a", "a shapefile"),
     (b"SQLite format 3", "a GeoPackage or another SQLite file"),
     (b"fgb", "FlatGeobuf"),
     (b"PK\x03\x04", "a ZIP archive, such as KMZ"),
@@ -56,16 +56,13 @@ const UNREAD: [(&[u8], &str); 5] = [
     (b"PAR1", "GeoParquet"),
 ];
 
-/// Reads the features of a file; `path` is where its companions, such as a shapefile's attributes, are looked for.
+/// Reads the features of a file; the ending of `path` helps where the text does not tell.
 ///
 /// # Errors
 /// When the file as a whole cannot be read.
 pub fn read(bytes: &[u8], path: &Path) -> Result<Features, FormatError> {
     if let Some((_, format)) = UNREAD.iter().find(|(begin, _)| bytes.starts_with(begin)) {
         return Err(FormatError::Unread { format });
-    }
-    if shapefile::is_one(bytes) {
-        return shapefile::read(bytes, path);
     }
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}').trim_start();
