@@ -3,12 +3,16 @@
 mod heuristic;
 mod lookahead;
 mod random;
+mod repair;
 mod spec;
+mod transitions;
 
 pub use heuristic::Heuristic;
 pub use lookahead::{Allowance, Beam, BeamSearch, Experience, Found, Lookahead, Search, Sequence, wait_for_a_window};
 pub use random::Random;
+pub use repair::{Aspen, Method, Repair};
 pub use spec::{PlannerSpec, UnknownPlanner};
+pub use transitions::Transitions;
 
 use thiserror::Error;
 
