@@ -1,9 +1,12 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|bench`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|soak`.
 
 mod bench;
+mod examples;
 mod libtorch;
+mod lint;
 mod prerequisites;
 mod process;
+mod soak;
 mod venv;
 
 use std::ffi::OsString;
@@ -24,7 +27,12 @@ usage: cargo xtask COMMAND
                    `cargo test`
   mission [ARGS…]  set up, build, and fly examples/missions/one_orbit.toml; ARGS
                    go to `swath launch` (--help shows them)
+  lint             check format, clippy, licences and sources of dependencies, and
+                   that all of them are used; builds the tools that are missing
   bench            run every crate's measurements and print one JSON object
+  soak [NAME [SEEDS]]
+                   run a long figure to its end and print it as JSON; one that was
+                   stopped goes on; without a name, list them
 ";
 
 fn main() -> ExitCode {
@@ -47,7 +55,9 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("setup") => setup(&root, with_tests(rest)?),
         Some("test") => test(&root, rest),
         Some("mission") => mission(&root, rest),
+        Some("lint") => lint(&root, rest),
         Some("bench") => bench(&root, rest),
+        Some("soak") => soak(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
             Ok(())
@@ -75,10 +85,10 @@ fn setup(root: &Path, tests: bool) -> Result<()> {
 }
 
 /// Runs every test in the release profile: what is tested is what is flown, and one build serves both commands. Programs
-/// come first: tests run those of other packages too, which cargo does not build for them.
+/// and examples come first: tests run those of other packages too, which cargo does not build for them.
 fn test(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, true)?;
-    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins"]))?;
+    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins", "--examples"]))?;
     let mut cargo = process::cargo(root, "test");
     cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));
@@ -102,6 +112,19 @@ fn bench(root: &Path, args: &[OsString]) -> Result<()> {
     }
     setup(root, false)?;
     bench::run(root)
+}
+
+fn lint(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("lint takes no arguments\n\n{USAGE}");
+    }
+    setup(root, false)?;
+    lint::run(root)
+}
+
+fn soak(root: &Path, args: &[OsString]) -> Result<()> {
+    setup(root, true)?;
+    soak::run(root, args)
 }
 
 fn repository_root() -> Result<PathBuf> {

@@ -6,9 +6,14 @@ use clap::Args;
 use serde_json::json;
 use swath_ros::RosArgs;
 
-use super::{ReadArgs, WITH_LOSS, bags, copy::seconds, done, overrides, print_json, signals::shutdown_on_signals};
+use super::{
+    common::{ReadArgs, WITH_LOSS, bags, done, overrides, print_json},
+    copy::seconds,
+    signals::shutdown_on_signals,
+};
 use crate::{
     error::{Result, chain},
+    out::say,
     play::{End, LAST_MESSAGES, PlayOptions, Player},
     reader::TopicPattern,
 };
@@ -104,7 +109,7 @@ impl PlayArgs {
             "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3,
         }))?;
         if summary.refused > 0 {
-            eprintln!("{} messages could not be published", summary.refused);
+            say(&format!("{} messages could not be published", summary.refused));
         }
         let code = done(&summary.faults);
         Ok(if summary.refused == 0 { code } else { ExitCode::from(WITH_LOSS) })

@@ -13,10 +13,15 @@ use clap::Args;
 use serde_json::{Value, json};
 use swath_ros::RosArgs;
 
-use super::{WITH_LOSS, copy::Shape, overrides, print_json, signals::shutdown_on_signals};
+use super::{
+    common::{WITH_LOSS, overrides, print_json},
+    copy::Shape,
+    signals::shutdown_on_signals,
+};
 use crate::{
     error::{BagError, Result},
     file::chunk::Compression,
+    out::say,
     preset::Preset,
     reader::TopicPattern,
     record::{RecordOptions, Recorder},
@@ -134,7 +139,7 @@ impl RecordArgs {
             "bytes": summary.bytes, "files": summary.files,
         }))?;
         if summary.lost > 0 {
-            eprintln!("{} messages were lost", summary.lost);
+            say(&format!("{} messages were lost", summary.lost));
             return Ok(ExitCode::from(WITH_LOSS));
         }
         Ok(ExitCode::SUCCESS)
@@ -201,7 +206,7 @@ impl RecordArgs {
             (mode, format) => {
                 options.compression = format.unwrap_or_default();
                 let name = options.compression.mcap_name();
-                eprintln!("--compression-mode {mode}: chunks are compressed with {name}, not each {mode}");
+                say(&format!("--compression-mode {mode}: chunks are compressed with {name}, not each {mode}"));
                 Ok(options)
             }
         }

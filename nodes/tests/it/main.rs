@@ -5,6 +5,8 @@ mod bad_input;
 mod bag;
 mod clients;
 mod common;
+mod examples;
+mod habits;
 mod killed;
 mod operators_day;
 mod parity;

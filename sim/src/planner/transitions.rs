@@ -2,14 +2,14 @@
 
 use nalgebra::Vector3;
 
-use super::{Allowance, Search};
+use super::lookahead::{Allowance, Search};
 use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::flight::Situation;
 use crate::vehicle::mrp;
-use crate::world::frames::{earth_to_inertial, reference_dcm};
+use crate::world::frames::reference_dcm;
 use crate::world::orbit::Orbit;
 use crate::world::strip::Strip;
 use crate::world::turn::Turn;
@@ -58,6 +58,7 @@ impl<'a> Transitions<'a> {
             body: BodyState { sigma_BN, omega_BN_B, wheel_speed: wheels / plant.wheel_inertia },
             servo_integral: Vector3::zeros(),
             torque_pending: Vector3::zeros(),
+            resources: self.search.begin.resources,
         }
     }
 
@@ -69,10 +70,10 @@ impl<'a> Transitions<'a> {
 
     /// The reference attitude of a strip, σ_RN.
     fn reference(&mut self, strip: &Strip, start: Tick, at: Tick) -> Vector3<f64> {
-        let (target_E, scan_E) = strip.target_E(at.since(start) as f64 * self.model.period.seconds());
+        let elapsed = at.since(start) as f64 * self.model.period.seconds();
         let turn = self.earth.cos_sin(at);
-        let target_N = earth_to_inertial(turn, &target_E) * self.model.config.earth.radius_m;
-        mrp::from_dcm(&reference_dcm(&self.orbit.position(at), &target_N, &earth_to_inertial(turn, &scan_E)))
+        let (target_N, scan_N) = strip.target_N(elapsed, turn, self.model.config.earth.radius_m);
+        mrp::from_dcm(&reference_dcm(&self.orbit.position(at), &target_N, &scan_N))
     }
 }
 

@@ -7,7 +7,9 @@ mod search;
 
 use std::collections::VecDeque;
 
-use super::{Allowance, Decision, DecisionContext, Experience, Planner, PlannerError, Transitions, wait_for_a_window};
+use super::decision::{Decision, DecisionContext, Planner, PlannerError, wait_for_a_window};
+use super::lookahead::{Allowance, Experience};
+use super::transitions::Transitions;
 use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::rng;

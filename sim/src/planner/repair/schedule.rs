@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::planner::Transitions;
+use super::super::transitions::Transitions;
 use crate::requests::catalogue::Candidate;
 use crate::time::Tick;
 use crate::vehicle::flight::Situation;
@@ -95,7 +95,7 @@ impl<'a, 'm> Problem<'a, 'm> {
 
     /// Whether two goals are one strip.
     pub(super) fn same(&self, a: usize, b: usize) -> bool {
-        a == b || self.goals[a].strip.is_twin_of(&self.goals[b].strip)
+        a == b || self.goals[a].twin == Some(self.goals[b].id)
     }
 
     /// Earliest tick at which imaging of a goal can begin after an activity, or from the beginning.
