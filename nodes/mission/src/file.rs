@@ -20,8 +20,8 @@ use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
-use crate::orders::geojson;
-use crate::orders::geojson::{Lengths, RequestsFileError};
+use crate::orders::cutting::{Cutting, SWATH_KM};
+use crate::orders::import::{Fault, RequestsFileError, import};
 use crate::orders::order::Order;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
@@ -116,10 +116,12 @@ fn is_exact(plant: &PlantErrors) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MissionRequests {
-    /// GeoJSON files, relative to the mission file.
+    /// Files with lines and areas, of any format that is read, relative to the mission file.
     pub files: Vec<PathBuf>,
     /// Attempts before a request fails, for requests that do not say; attempts that were cut short do not count.
     pub max_attempts: u32,
+    /// Width of what the camera shows [km]: lines are followed and areas are covered by strips of it.
+    pub swath_km: f64,
     /// Random strips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub random: Option<ScenarioConfig>,
@@ -127,7 +129,7 @@ pub struct MissionRequests {
 
 impl Default for MissionRequests {
     fn default() -> Self {
-        Self { files: Vec::new(), max_attempts: 10, random: None }
+        Self { files: Vec::new(), max_attempts: 10, swath_km: SWATH_KM, random: None }
     }
 }
 
@@ -195,6 +197,7 @@ impl Mission {
             ("requests.max_attempts", f64::from(self.requests.max_attempts), 1.0, f64::from(ATTEMPTS_MAX)),
             ("approval.deadline_s", self.approval.deadline_s, 0.1, 1e6),
             ("approval.look_again_s", self.approval.look_again_s, 0.1, 3600.0),
+            ("requests.swath_km", self.requests.swath_km, 0.1, 1000.0),
         ] {
             if !(min..=max).contains(&value) {
                 return Err(MissionError::OutOfRange { name, value, min, max });
@@ -267,14 +270,24 @@ impl Mission {
         horizon(model, self.orbits)
     }
 
-    /// The strips known from the start: those of the files, in order, then the random ones.
+    /// How lines and areas become strips.
+    #[must_use]
+    pub fn cutting(&self) -> Cutting {
+        let swath_km = self.requests.swath_km;
+        Cutting { swath_km, tolerance_km: 0.5 * swath_km, ..Cutting::of(&self.sim) }
+    }
+
+    /// The strips known from the start: those of the files, in order, then the random ones; and what in the files is no
+    /// strip.
     ///
     /// # Errors
-    /// When a file cannot be used.
-    pub fn initial_requests(&self) -> Result<Vec<Order>, MissionError> {
-        let mut requests = Vec::new();
+    /// When a file as a whole cannot be used.
+    pub fn initial_requests(&self) -> Result<(Vec<Order>, Vec<Fault>), MissionError> {
+        let (mut requests, mut faults) = (Vec::new(), Vec::new());
         for file in &self.requests.files {
-            requests.extend(geojson::read(file, Lengths::of(&self.sim))?);
+            let import = import(file, &self.cutting())?;
+            requests.extend(import.orders);
+            faults.extend(import.refused);
         }
         if let Some(scenario) = &self.requests.random {
             let mut rng = rng::stream(self.seed, rng::CATALOGUE);
@@ -286,7 +299,7 @@ impl Mission {
                 }),
             );
         }
-        Ok(requests)
+        Ok((requests, faults))
     }
 }
 

@@ -89,7 +89,8 @@ impl InProcessMission {
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
-        let initial = mission.initial_requests()?;
+        let (initial, faults) = mission.initial_requests()?;
+        faults.iter().for_each(|fault| tracing::warn!("{fault}"));
         let requested = initial.len();
         for order in initial {
             // Why one is refused is in the request manager's counts.

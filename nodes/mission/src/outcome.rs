@@ -5,6 +5,8 @@ use swath_sim::mission::Delivered;
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
+use crate::guarded::Deciders;
+
 /// One line of `tasks.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaskLine {
@@ -68,8 +70,14 @@ pub struct NodeProcess {
 /// `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Planner's name.
+    /// Name of the planner that was asked for.
     pub planner: String,
+    /// Decisions by the name of the planner that made them.
+    #[serde(default)]
+    pub deciders: Deciders,
+    /// Why the mission was not flown to its end; absent if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
     /// Seed of the mission.
     pub seed: u64,
     /// Length [orbits].
@@ -123,8 +131,12 @@ pub struct ResourcesSummary {
 /// What a summary takes from outside the totals.
 #[derive(Clone, Debug, Default)]
 pub struct SummaryInputs {
-    /// Planner's name.
+    /// Name of the planner that was asked for.
     pub planner: String,
+    /// Decisions by the name of the planner that made them.
+    pub deciders: Deciders,
+    /// Why the mission was not flown to its end.
+    pub failure: Option<String>,
     /// Seed of the mission.
     pub seed: u64,
     /// Length [orbits].
@@ -154,6 +166,8 @@ impl Summary {
         let sim_seconds = seconds(inputs.ticks);
         Self {
             planner: inputs.planner,
+            deciders: inputs.deciders,
+            failure: inputs.failure,
             seed: inputs.seed,
             orbits: inputs.orbits,
             sim_seconds,
@@ -179,8 +193,10 @@ impl Summary {
     #[must_use]
     pub fn table(&self) -> String {
         let mean = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} s"));
+        let others: Vec<_> = self.deciders.iter().filter(|(name, _)| **name != self.planner).collect();
+        let others = others.iter().map(|(name, count)| format!(", {count} decisions by {name}"));
         let mut rows = vec![
-            ("planner", self.planner.clone()),
+            ("planner", self.planner.clone() + &others.collect::<String>()),
             ("seed", self.seed.to_string()),
             ("orbits", self.orbits.to_string()),
             ("simulated time", format!("{:.0} s", self.sim_seconds)),

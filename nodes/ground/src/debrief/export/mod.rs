@@ -13,8 +13,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
-use self::track::Track;
-use super::recorded::{NAMESPACE, Recorded};
+use super::recorded::RecordedArgs;
+use track::Track;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -24,8 +24,8 @@ use super::recorded::{NAMESPACE, Recorded};
 Writes tasks, states and decisions as .csv and .parquet, strips.geojson and ground_track.geojson, and
 mission.czml with orbit and attitude for Cesium.")]
 pub struct ExportArgs {
-    /// Bag directory or .mcap file of a mission
-    bag: PathBuf,
+    #[command(flatten)]
+    recorded: RecordedArgs,
     /// Folder for the files; it is made if it is not there
     #[arg(short, long)]
     output: PathBuf,
@@ -35,9 +35,6 @@ pub struct ExportArgs {
     /// Time between points of ground track, orbit and attitude [s]
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = step)]
     step: f64,
-    /// Namespace of the mission's nodes
-    #[arg(long, default_value = NAMESPACE)]
-    namespace: String,
 }
 
 /// A kind of file.
@@ -59,7 +56,7 @@ impl ExportArgs {
     /// # Errors
     /// When the bag holds no mission or a file cannot be written.
     pub fn run(self) -> Result<ExitCode> {
-        let recorded = Recorded::open(&self.bag, &self.namespace)?;
+        let recorded = self.recorded.open()?;
         let folder = &self.output;
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let wanted = |format| self.format.is_empty() || self.format.contains(&format);

@@ -1,4 +1,4 @@
-//! The satellite's way over the ground.
+//! The satellite's way over the ground, read from a bag.
 
 use anyhow::Result;
 use nalgebra::{UnitQuaternion, Vector3};
