@@ -7,7 +7,7 @@ use quick_xml::events::Event;
 use serde_json::Value;
 
 use super::super::feature::{Feature, Part};
-use super::{Features, FormatError};
+use super::error::{Features, FormatError};
 use crate::shapes::sphere::Place;
 
 /// Reads a text that begins like XML and has a `kml` element.
