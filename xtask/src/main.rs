@@ -11,6 +11,7 @@ mod soak;
 mod venv;
 
 use std::ffi::OsString;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -141,8 +142,8 @@ fn ament(root: &Path, args: &[OsString]) -> Result<()> {
     let packages = ["--package", "swath-nodes", "--package", "swath-bags", "--bins"];
     process::run(process::cargo(root, "build").arg("--release").args(packages))?;
     ament::lay_out(root, &root.join("target/release"), &prefix)?;
-    println!("export AMENT_PREFIX_PATH={}:$AMENT_PREFIX_PATH", prefix.display());
-    Ok(())
+    let line = format!("export AMENT_PREFIX_PATH={}:$AMENT_PREFIX_PATH", prefix.display());
+    writeln!(std::io::stdout(), "{line}").context("cannot say where ROS finds the programs")
 }
 
 fn repository_root() -> Result<PathBuf> {
