@@ -235,7 +235,7 @@ fn damaged_files_of_every_format_are_refused_or_read_and_nothing_panics() {
     let mut rng = rand::rngs::StdRng::seed_from_u64(5);
     let mut read = 0;
     for (name, seed) in &seeds {
-        for _ in 0..60 {
+        for _ in 0..4000 {
             let mut bytes = seed.clone();
             for _ in 0..rng.random_range(1..4) {
                 let at = rng.random_range(0..bytes.len());
@@ -252,5 +252,5 @@ fn damaged_files_of_every_format_are_refused_or_read_and_nothing_panics() {
             read += usize::from(try_read(name, &bytes).is_ok());
         }
     }
-    assert!(read > 50, "only {read} were still read");
+    assert!(read > 1000, "only {read} were still read");
 }
