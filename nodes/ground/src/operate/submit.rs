@@ -80,7 +80,14 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     let files = Files::read(&args.files)?;
     let operator = if args.dry_run || files.shapes() == 0 { None } else { Some(Operator::start()?) };
     let cutting = match &operator {
-        Some(operator) => args.cutting.of_mission(operator)?,
+        Some(operator) => match args.cutting.of_mission(operator) {
+            Ok(cutting) => cutting,
+            Err(error) => {
+                // What is wrong with the files is told although nobody answers.
+                _ = files.cut(&args.cutting.usual()?);
+                return Err(error);
+            }
+        },
         None if files.shapes() == 0 => args.cutting.usual()?,
         None => args.cutting.of_any()?,
     };
