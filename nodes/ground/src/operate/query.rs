@@ -81,7 +81,6 @@ pub struct ShowArgs {
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or a strip would be refused.
-#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
 pub fn preview(args: &PreviewArgs) -> Result<()> {
     let files = Files::read(&args.files)?;
     let operator = Operator::start()?;
@@ -205,7 +204,6 @@ impl Standing {
 ///
 /// # Errors
 /// When nobody answers or there is no such strip.
-#[expect(clippy::print_stdout, reason = "the report is this command's result")]
 pub fn show(args: &ShowArgs) -> Result<()> {
     let operator = Operator::start()?;
     let call = msg::GetStripRequest {
