@@ -22,7 +22,7 @@ fn tasks(mission: &Path, out: &Path, words: &[&str]) -> String {
 fn missions_over_dds_and_in_one_process_are_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let mission = common::write_mission(folder.path(), MISSION);
-    for planner in ["heuristic:80", "random", "lookahead", "beam", "hop-ppo", "hop-ppo+lookahead"] {
+    for planner in ["heuristic:80", "random", "lookahead", "beam", "repair", "aspen", "hop-ppo", "hop-ppo+lookahead"] {
         for seed in ["1", "2", "3"] {
             let words = ["--planner", planner, "--seed", seed];
             let out = |kind: &str| folder.path().join(format!("{planner}-{seed}-{kind}"));
