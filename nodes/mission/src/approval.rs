@@ -231,6 +231,8 @@ impl Gate {
                 Ok(Decision::Image { candidate: index, t_pre })
             }
             Decision::Wait { ticks } => Ok(Decision::Wait { ticks: ticks.min(self.look_again) }),
+            // What the satellite does for itself needs nobody's approval.
+            duty @ Decision::Serve { .. } => Ok(duty),
         }
     }
 
@@ -252,6 +254,8 @@ impl Gate {
                 Ok(Decision::Wait { ticks: self.look_again })
             }
             Decision::Wait { ticks } => Ok(Decision::Wait { ticks: ticks.min(self.look_again) }),
+            // What the satellite does for itself needs nobody's approval.
+            duty @ Decision::Serve { .. } => Ok(duty),
         }
     }
 

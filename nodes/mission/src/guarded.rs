@@ -1,5 +1,7 @@
 //! Planners as missions fly them: whatever happens to one, somebody decides.
 
+use std::collections::BTreeMap;
+
 use anyhow::Result;
 use swath_sim::planner::{
     Decision, DecisionContext, Heuristic, Lookahead, Planner, PlannerError, PlannerSpec, Rationale,
@@ -24,11 +26,25 @@ const FALLBACK_T_PRE_S: f64 = 90.0;
 /// Why a planner that does not fly its slews in its head does not decide any more.
 const WHEEL_LOST: &str = "a wheel is lost, and the planner does not know what the others can point at";
 
+/// The planner that takes over.
+const FALLBACK: Heuristic = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
+
+/// Who made the decisions of a mission: their numbers by name of the planner.
+pub type Deciders = BTreeMap<String, u64>;
+
+/// The decisions that another one made in the place of the planner that was asked for.
+#[must_use]
+pub fn made_instead(mut deciders: Deciders, asked_for: &PlannerSpec) -> Deciders {
+    let asked_for = asked_for.to_string();
+    let others = [FALLBACK.name(), Lookahead::default().name()];
+    deciders.retain(|decider, _| others.contains(decider) && *decider != asked_for);
+    deciders
+}
+
 /// A planner with the heuristic behind it, which decides when the planner cannot.
 pub struct GuardedPlanner {
     /// None when it could not be made.
     planner: Option<Box<dyn Planner + Send>>,
-    fallback: Heuristic,
     /// Decides once a wheel is lost, where the planner does not know what is left to point with.
     degraded: Lookahead,
     /// Whether it made the last decision.
@@ -37,6 +53,7 @@ pub struct GuardedPlanner {
     fault: Option<String>,
     /// Why it could not be made.
     missing: Option<String>,
+    deciders: Deciders,
 }
 
 impl GuardedPlanner {
@@ -45,29 +62,32 @@ impl GuardedPlanner {
     pub fn make(policies: &Policies, spec: &PlannerSpec, seed: u64) -> Self {
         match (policies.make)(spec, seed) {
             Ok(planner) => Self::new(planner),
-            Err(error) => Self {
-                planner: None,
-                fallback: Heuristic { t_pre_s: FALLBACK_T_PRE_S },
-                degraded: Lookahead::default(),
-                degraded_decided: false,
-                fault: None,
-                missing: Some(format!("{error:#}")),
-            },
+            Err(error) => {
+                let degraded = Lookahead::default();
+                let (fault, missing, deciders) = (None, Some(format!("{error:#}")), Deciders::new());
+                Self { planner: None, degraded, degraded_decided: false, fault, missing, deciders }
+            }
         }
     }
 
     /// Guards a planner.
     #[must_use]
     pub fn new(planner: Box<dyn Planner + Send>) -> Self {
-        let fallback = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
         let degraded = Lookahead::default();
-        Self { planner: Some(planner), fallback, degraded, degraded_decided: false, fault: None, missing: None }
+        let (fault, missing, deciders) = (None, None, Deciders::new());
+        Self { planner: Some(planner), degraded, degraded_decided: false, fault, missing, deciders }
     }
 
     /// Why there is no planner but the heuristic.
     #[must_use]
     pub fn missing(&self) -> Option<&str> {
         self.missing.as_deref()
+    }
+
+    /// Who has made the decisions.
+    #[must_use]
+    pub fn deciders(&self) -> &Deciders {
+        &self.deciders
     }
 
     /// Why another one made the last decision in the planner's place.
@@ -90,22 +110,27 @@ impl Planner for GuardedPlanner {
             return self.degraded.name();
         }
         let own = self.planner.as_ref().filter(|_| self.fault.is_none());
-        own.map_or_else(|| self.fallback.name(), |planner| planner.name())
+        own.map_or_else(|| FALLBACK.name(), |planner| planner.name())
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+        let mut fallback = FALLBACK;
         self.fault = None;
         let minds = self.planner.as_ref().is_some_and(|planner| planner.minds_wheels());
         self.degraded_decided = lost(&context.situation.wheels) && !minds;
-        if self.degraded_decided {
-            self.fault = Some(WHEEL_LOST.to_owned());
-            return usable(&mut self.degraded, context);
-        }
-        let Some(planner) = &mut self.planner else { return usable(&mut self.fallback, context) };
-        usable(planner.as_mut(), context).or_else(|error| {
-            self.fault = Some(error.to_string());
-            usable(&mut self.fallback, context)
-        })
+        let decision = match &mut self.planner {
+            _ if self.degraded_decided => {
+                self.fault = Some(WHEEL_LOST.to_owned());
+                usable(&mut self.degraded, context)
+            }
+            Some(planner) => usable(planner.as_mut(), context).or_else(|error| {
+                self.fault = Some(error.to_string());
+                usable(&mut fallback, context)
+            }),
+            None => usable(&mut fallback, context),
+        };
+        *self.deciders.entry(self.name()).or_insert(0) += 1;
+        decision
     }
 
     fn forget(&mut self) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use swath_sim::mission::{Mission as Loop, RequestKeeper};
 use swath_sim::model::Model;
-use swath_sim::planner::{Decision, Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{SettledTask, TaskRecord};
 use swath_sim::time::{Tick, TickPeriod};
@@ -19,7 +19,7 @@ use crate::alarms::conditions::{Report, back, of_health, of_plan, of_planner, re
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::orders::action::Action;
-use crate::outcome::TaskLine;
+use crate::outcome::{ResourcesSummary, TaskLine};
 use crate::requests::logic::RequestLogic;
 use crate::requests::refusal::Refusal;
 
@@ -133,7 +133,8 @@ impl InProcessMission {
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
-        let initial = mission.initial_requests()?;
+        let (initial, faults) = mission.initial_requests()?;
+        faults.iter().for_each(|fault| tracing::warn!("{fault}"));
         let requested = initial.len();
         for order in initial {
             // Why one is refused is in the request manager's counts.
@@ -183,6 +184,17 @@ impl InProcessMission {
         (self.requested, self.requests().len())
     }
 
+    /// What came to the ground so far and how power and data stand, in a mission with resources.
+    #[must_use]
+    pub fn resources(&self) -> Option<ResourcesSummary> {
+        let onboard = self.mission.onboard()?;
+        Some(ResourcesSummary {
+            delivered: *self.mission.delivered(),
+            battery_level: onboard.battery().level(),
+            stored_bits: onboard.storage().stored(),
+        })
+    }
+
     /// Decides and flies to the end, handing each task and its line to `each`.
     ///
     /// # Errors
@@ -217,8 +229,8 @@ impl InProcessMission {
         }
         let decided_at = self.mission.now();
         let (decision, delay) = match self.faults.hold(decided_at, planner) {
-            Some(ticks) => (Decision::Wait { ticks }, 0),
-            None => (planner.decide(&self.mission.context())?, self.mission.planning_delay()),
+            Some(ticks) => (self.mission.decide(&mut Nobody { ticks })?, 0),
+            None => (self.mission.decide(planner)?, self.mission.planning_delay()),
         };
         let settled = self.fly(decision, delay, until.min(self.mission.horizon()))?;
         self.report(Some(of_planner(decided_at, planner.replaced(), &planner.name())));
@@ -256,6 +268,21 @@ impl InProcessMission {
         reports.extend(planner);
         report_all(&mut self.board, reports);
         self.board.advance(now);
+    }
+}
+
+/// Decides in the place of a planner that is away: the attitude is held.
+struct Nobody {
+    ticks: u32,
+}
+
+impl Planner for Nobody {
+    fn name(&self) -> String {
+        "nobody".to_owned()
+    }
+
+    fn decide(&mut self, _: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+        Ok(Decision::Wait { ticks: self.ticks })
     }
 }
 

@@ -3,14 +3,14 @@
 use nalgebra::Vector3;
 
 use crate::model::Model;
-use crate::task::{Task, TaskOutcome, TaskRecord};
+use crate::task::{Duty, Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::executive::{Executive, Sight};
 use crate::vehicle::guidance::GuidanceTick;
 use crate::vehicle::health;
 use crate::vehicle::health::Health;
-use crate::vehicle::resources::{Activity, Imager};
+use crate::vehicle::resources::{Activity, Imager, ResourceState};
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;
 
@@ -31,6 +31,8 @@ pub struct Situation {
     pub torque_pending: Vector3<f64>,
     /// Share of its torque limit that each wheel is known to give; 1 for a sound one.
     pub wheels: Vector3<f64>,
+    /// How power and data stand, where they have bounds.
+    pub resources: Option<ResourceState>,
 }
 
 /// Spacecraft and executive in one process, with the latency of one tick between them.
@@ -94,6 +96,7 @@ impl Flight {
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
             wheels: self.executive.health().wheels,
+            resources: self.spacecraft.onboard().map(|onboard| *onboard.state()),
         }
     }
 
@@ -153,7 +156,7 @@ impl Flight {
     pub fn without_guidance(&mut self, back: Tick, executive: Executive) {
         self.executive = executive;
         loop {
-            self.spacecraft.advance(&self.torque_pending);
+            self.advance();
             self.torque_pending = Vector3::zeros();
             if self.now() >= back {
                 return;
@@ -170,14 +173,19 @@ impl Flight {
     #[inline]
     pub fn tick(&mut self) -> GuidanceTick {
         let tick = self.executive.tick(&sight(&mut self.spacecraft));
+        self.advance();
+        self.torque_pending = tick.torque;
+        tick
+    }
+
+    #[inline]
+    fn advance(&mut self) {
         if self.spacecraft.onboard().is_some() {
             let activity = self.activity();
             self.spacecraft.advance_doing(&self.torque_pending, activity);
         } else {
             self.spacecraft.advance(&self.torque_pending);
         }
-        self.torque_pending = tick.torque;
-        tick
     }
 
     /// What imager, transmitter and thrusters do over the tick that begins now.
@@ -193,7 +201,9 @@ impl Flight {
                     activity.imager = Imager::Warm;
                 }
             }
-            Task::Wait { .. } => {}
+            Task::Serve { duty: Duty::Downlink, .. } => activity.downlink = true,
+            Task::Serve { duty: Duty::Desaturate, .. } => activity.desaturate = Some(now.since(start) as u32),
+            Task::Serve { duty: Duty::Charge, .. } | Task::Wait { .. } => {}
         }
         activity
     }

@@ -21,6 +21,8 @@ const JUDGEMENTS: u32 = 3;
 const MOVED: f64 = 1e-9;
 /// Difference of gyro and star tracker at which the gyro counts as biased [rad/s].
 const BIAS_MIN: f64 = 5e-5;
+/// What the mean of two rates may be off the turn between them, as a share of their difference.
+const UNSTEADY: f64 = 0.02;
 
 /// What is known of wheels and sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +90,8 @@ pub struct Watch {
     commands: [Option<(Tick, Vector3<f64>)>; 2],
     judged: [Judged; 3],
     residual: Vector3<f64>,
+    /// Change of the rate in a tick, as the same mean [rad/s].
+    change: f64,
     compared: u32,
     /// What came to be known, and when.
     changes: Vec<(Tick, Health)>,
@@ -128,6 +132,7 @@ impl Watch {
             commands: [None; 2],
             judged: [Judged::default(); 3],
             residual: Vector3::zeros(),
+            change: 0.0,
             compared: 0,
             changes: Vec::new(),
         }
@@ -236,14 +241,17 @@ impl Watch {
 
     /// Compares the gyro with the change of attitude over a tick.
     fn compare(&mut self, before: &BodyState, now: &BodyState, omega: &Vector3<f64>) {
-        // A small rotation by θ has the MRP θ/4.
-        let turned_B = mrp::subtract(&now.sigma_BN, &before.sigma_BN) * (4.0 / self.dt);
+        // A rotation by θ has the MRP tan(θ/4).
+        let sigma = mrp::subtract(&now.sigma_BN, &before.sigma_BN);
+        let norm = sigma.norm();
+        let turned_B = if norm > 0.0 { sigma * (4.0 * libm::atan(norm) / (norm * self.dt)) } else { sigma };
         self.compared += 1;
         // A mean of all, until there are as many as the running one weighs.
         let weight = self.weight.max(1.0 / f64::from(self.compared));
         self.residual += (omega - turned_B - self.residual) * weight;
+        self.change += ((now.omega_BN_B - before.omega_BN_B).amax() - self.change) * weight;
         let settled = f64::from(self.compared) * self.weight >= 1.0;
-        self.health.gyro_bias =
-            if settled && self.residual.amax() > BIAS_MIN { self.residual } else { Vector3::zeros() };
+        let biased = settled && self.residual.amax() > BIAS_MIN + UNSTEADY * self.change;
+        self.health.gyro_bias = if biased { self.residual } else { Vector3::zeros() };
     }
 }

@@ -212,3 +212,17 @@ fn faults_end_and_leave_a_sound_satellite() {
     let after = fly(&mut env, &mut planner).1;
     assert!(after.success_rate() > 0.97, "{after:?}");
 }
+
+/// However hard it is flown, also beyond what it can follow.
+#[test]
+fn nothing_is_found_wrong_with_a_sound_satellite() {
+    for seed in 0..6 {
+        for t_pre_s in [5.0, 20.0, 45.0] {
+            let mut env = two_orbits(seed);
+            env.suffer(&[], false);
+            fly(&mut env, &mut Heuristic { t_pre_s });
+            let found: Vec<_> = env.take_changes().into_iter().filter(|(_, it)| *it != Health::default()).collect();
+            assert!(found.is_empty(), "seed {seed}, T_pre {t_pre_s} s: {} finds, such as {:?}", found.len(), found[0]);
+        }
+    }
+}

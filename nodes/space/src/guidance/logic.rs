@@ -267,6 +267,7 @@ impl GuidanceLogic {
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
             wheels: self.executive.health().wheels,
+            resources: None,
         };
         if !over {
             self.waiting.push_back(state);
