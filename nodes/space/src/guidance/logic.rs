@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 use swath_sim::model::Model;
-use swath_sim::task::{Task, TaskRecord};
+use swath_sim::task::{Task, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
 use swath_sim::vehicle::flight::Situation;
@@ -87,6 +87,8 @@ pub enum Effect {
     Command(Command),
     /// A task is wanted; the tick's command follows when it has come.
     Decide(Box<DecisionPoint>),
+    /// What was ordered befalls guidance before it looks at its next state.
+    Strike,
 }
 
 /// The command of a tick, and what it rests on.
@@ -104,6 +106,39 @@ pub struct Command {
     pub remaining: u32,
 }
 
+/// What a guidance must know to go on where another one was.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Kept {
+    /// Number of the task in hand, or wanted.
+    pub task: u64,
+    /// The task in hand, as if it were cut short when it began.
+    pub flying: Option<FinishedTask>,
+    /// The task that ended where one was wanted.
+    pub finished: Option<FinishedTask>,
+    /// The last task that was to image.
+    pub last_imaging: Option<FinishedTask>,
+}
+
+/// When a guidance was lost by order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lost {
+    /// Tick of the first state that it did not look at.
+    pub at: Tick,
+    /// Tick of the first state that the next one looks at.
+    pub back: Tick,
+    /// Whether that state is waited for: it is sent again and again.
+    pub waits: bool,
+}
+
+/// What was before a guidance that was started again.
+#[derive(Clone, Debug)]
+struct Before {
+    flying: Option<FinishedTask>,
+    lost: Option<Lost>,
+    /// Tick of the first state that was looked at.
+    first: Option<Tick>,
+}
+
 /// The guidance node's state.
 #[derive(Clone, Debug)]
 pub struct GuidanceLogic {
@@ -119,8 +154,16 @@ pub struct GuidanceLogic {
     /// The state at which a task is wanted, then states that came meanwhile.
     waiting: VecDeque<StateSample>,
     latest: Option<Command>,
+    /// The command before the latest one.
+    earlier: Option<Command>,
     torque_pending: Vector3<f64>,
     last_imaging: Option<FinishedTask>,
+    /// The task that ended where one is wanted.
+    finished: Option<FinishedTask>,
+    /// There is something where another guidance flew before.
+    before: Option<Before>,
+    /// State at which it is struck.
+    strikes_at: Option<Tick>,
     /// Number of a task in hand that is given up at the next state.
     aborted: Option<u64>,
     /// Tasks that did not come in time.
@@ -142,8 +185,12 @@ impl GuidanceLogic {
             name: String::new(),
             waiting: VecDeque::new(),
             latest: None,
+            earlier: None,
             torque_pending: Vector3::zeros(),
             last_imaging: None,
+            finished: None,
+            before: None,
+            strikes_at: None,
             aborted: None,
             late: 0,
         }
@@ -175,6 +222,39 @@ impl GuidanceLogic {
         self
     }
 
+    /// What was ordered befalls it before it looks at the state at `tick`.
+    #[must_use]
+    pub fn struck_at(mut self, tick: Option<Tick>) -> Self {
+        self.strikes_at = tick;
+        self
+    }
+
+    /// Goes on where a guidance was that is lost: what it flew counts as interrupted.
+    #[must_use]
+    pub fn taking_up(mut self, kept: Kept, lost: Option<Lost>) -> Self {
+        self.task = kept.task;
+        self.finished = kept.finished;
+        self.last_imaging = kept.last_imaging;
+        self.before = Some(Before { flying: kept.flying, lost, first: None });
+        self
+    }
+
+    /// What another guidance must know to go on should this one be lost.
+    #[must_use]
+    pub fn kept(&self) -> Kept {
+        let flying = self.executive.task().map(|(task, start)| FinishedTask {
+            record: TaskRecord::new(self.task, task, start, start, TaskOutcome::NOT_BEGUN),
+            name: self.name.clone(),
+        });
+        Kept { task: self.task, flying, finished: self.finished.clone(), last_imaging: self.last_imaging.clone() }
+    }
+
+    /// What changes whenever [`Self::kept`] does: number of the task, and whether it is in hand.
+    #[must_use]
+    pub fn marks(&self) -> (u64, bool) {
+        (self.task, self.executive.task().is_some())
+    }
+
     /// What came to be known of wheels and sensors since the last call, each with its tick.
     pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
         self.executive.take_changes()
@@ -182,10 +262,14 @@ impl GuidanceLogic {
 
     /// Takes a state. A state seen before brings its command again, so that a lost sample stops nothing.
     pub fn on_state(&mut self, state: StateSample) -> Vec<Effect> {
+        if let Some(effects) = self.mind_the_one_before(state.tick) {
+            return effects;
+        }
         if let Some(latest) = &self.latest
             && state.tick <= latest.tick
         {
-            return if state.tick == latest.tick { vec![Effect::Command(latest.clone())] } else { Vec::new() };
+            let known = self.latest.iter().chain(&self.earlier).find(|command| command.tick == state.tick);
+            return known.map(|command| Effect::Command(command.clone())).into_iter().collect();
         }
         if !self.waiting.is_empty() {
             if self.waiting.iter().all(|waiting| waiting.tick < state.tick) {
@@ -194,6 +278,25 @@ impl GuidanceLogic {
             return Vec::new();
         }
         self.process(state)
+    }
+
+    /// What is answered to a state that is not looked at, because another guidance flew before.
+    fn mind_the_one_before(&mut self, tick: Tick) -> Option<Vec<Effect>> {
+        let before = self.before.as_mut()?;
+        let first = match before.first {
+            Some(first) => first,
+            None => {
+                let wanted = before.lost.map_or(tick, |lost| lost.back.min(self.horizon));
+                if tick < wanted || (tick > wanted && before.lost.is_some_and(|lost| lost.waits)) {
+                    return Some(Vec::new());
+                }
+                before.first = Some(tick);
+                tick
+            }
+        };
+        // Nobody knows any more what would have been commanded there.
+        let idle = || Command { tick, task: self.task, guidance: GuidanceTick::IDLE, has_strip: false, remaining: 0 };
+        (tick < first).then(|| vec![Effect::Command(idle())])
     }
 
     /// Takes the task wanted.
@@ -226,6 +329,15 @@ impl GuidanceLogic {
         self.begin(TaskOrder { task: self.task, kind: Task::Wait { ticks: self.hold }, name: String::new() }, 0)
     }
 
+    /// There is no planner for `ticks`: holds the attitude for a while, then asks.
+    pub fn on_absence(&mut self, ticks: u32) -> Vec<Effect> {
+        if self.wanted().is_none() {
+            return Vec::new();
+        }
+        let kind = Task::Wait { ticks: self.hold.min(ticks).max(1) };
+        self.begin(TaskOrder { task: self.task, kind, name: String::new() }, 0)
+    }
+
     /// A task is no longer wanted: it ends at the next state, unless imaging has begun. Returns whether it ends.
     pub fn on_abort(&mut self, task: u64) -> bool {
         let slewing = match (self.executive.number(), &self.latest) {
@@ -243,6 +355,7 @@ impl GuidanceLogic {
         let Some(state) = states.pop_front() else { return Vec::new() };
         self.executive.begin(order.task, order.kind, delay, &sight(&state));
         self.name = order.name;
+        self.finished = None;
         let mut effects = vec![self.fly(&state)];
         for state in states {
             effects.extend(self.on_state(state));
@@ -251,10 +364,19 @@ impl GuidanceLogic {
     }
 
     fn process(&mut self, state: StateSample) -> Vec<Effect> {
+        if self.strikes_at.is_some_and(|at| state.tick >= at) {
+            return vec![Effect::Strike];
+        }
+        let lost = self.before.as_mut().and_then(|before| Some((before.flying.take()?, before.lost)));
         let aborted = self.aborted.take().is_some_and(|task| self.may_end(task, &state));
         let ended = aborted || self.executive.end().is_some_and(|end| state.tick >= end);
         let over = state.tick >= self.horizon;
-        let finished = if ended || over { self.finish(&state) } else { None };
+        let finished = match lost {
+            Some((task, lost)) => Some(self.interrupted(task, lost.map_or(state.tick, |lost| lost.at))),
+            None if ended || over => self.finish(&state),
+            None => None,
+        };
+        self.finished = finished.or(self.finished.take());
         if self.executive.task().is_some() {
             return vec![self.fly(&state)];
         }
@@ -277,9 +399,20 @@ impl GuidanceLogic {
             state: StateSample { body, ..state },
             situation,
             mission_over: over,
-            finished,
+            finished: self.finished.clone(),
             last_imaging: self.last_imaging.clone(),
         }))]
+    }
+
+    /// The task that a lost guidance flew, cut short where that was lost.
+    fn interrupted(&mut self, mut task: FinishedTask, at: Tick) -> FinishedTask {
+        task.record.end = at;
+        task.record.start = task.record.start.min(at);
+        self.task = task.record.task + 1;
+        if task.record.strip.is_some() {
+            self.last_imaging = Some(task.clone());
+        }
+        task
     }
 
     /// Whether a task is in hand whose imaging has not begun at a state.
@@ -315,7 +448,7 @@ impl GuidanceLogic {
             None => (false, 0),
         };
         let command = Command { tick: state.tick, task: self.task, guidance, has_strip, remaining };
-        self.latest = Some(command.clone());
+        self.earlier = self.latest.replace(command.clone());
         Effect::Command(command)
     }
 }
@@ -385,6 +518,7 @@ mod tests {
             }
             while let Some(effect) = effects.pop_front() {
                 match effect {
+                    Effect::Strike => unreachable!("nothing was ordered"),
                     Effect::Command(command) => spacecraft.command(command.tick, command.guidance.torque).unwrap(),
                     Effect::Decide(point) => {
                         over = point.mission_over;
