@@ -24,6 +24,7 @@ const STRUCK: &str = "struck";
 
 impl Sign {
     /// The line.
+    #[must_use]
     pub fn line(&self) -> String {
         match self {
             Self::Alive(now_ns) => format!("{ALIVE} {now_ns}\n"),
@@ -32,6 +33,7 @@ impl Sign {
     }
 
     /// Reads a line; nothing for one that is the program's own.
+    #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
         let (word, number) = line.trim_end().split_once(' ')?;
         let number = number.parse().ok()?;
