@@ -4,6 +4,7 @@ mod client;
 mod cover;
 mod export;
 mod files;
+mod orders;
 mod planner;
 mod query;
 mod selection;
@@ -39,11 +40,14 @@ enum StripsCommand {
     /// List strips by state, area and time.
     #[command(after_help = "Example: swath strips list --state accepted --area 35,70,-10,40")]
     List(query::ListArgs),
+    /// List orders, each a line or an area with its strips, and how much of each is imaged.
+    #[command(after_help = "Example: swath strips orders --submitter floods")]
+    Orders(orders::OrdersArgs),
     /// Show all that is known of a strip: chances, attempts, history.
     Show(query::ShowArgs),
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
-    /// Replace a strip by the one of a file.
+    /// Replace a strip, or a whole order, by the line or area of a file.
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),
@@ -70,6 +74,7 @@ pub fn run_strips(args: &StripsArgs) -> Result<()> {
         StripsCommand::Cover(args) => cover::cover(args),
         StripsCommand::Preview(args) => query::preview(args),
         StripsCommand::List(args) => query::list(args),
+        StripsCommand::Orders(args) => orders::orders(args),
         StripsCommand::Show(args) => query::show(args),
         StripsCommand::Cancel(args) => submit::cancel(args),
         StripsCommand::Replace(args) => submit::replace(args),
