@@ -41,7 +41,8 @@ enum StripsCommand {
     #[command(after_help = "Example: swath strips list --state accepted --area 35,70,-10,40")]
     List(query::ListArgs),
     /// List orders, each a line or an area with its strips, and how much of each is imaged.
-    #[command(after_help = "Example: swath strips orders --submitter floods")]
+    #[command(after_help = "Examples:\n  swath strips orders --submitter floods\n  \
+        swath strips orders --store out/one/requests.sqlite")]
     Orders(orders::OrdersArgs),
     /// Show all that is known of a strip: chances, attempts, history.
     Show(query::ShowArgs),

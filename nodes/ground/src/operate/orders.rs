@@ -1,6 +1,7 @@
 //! Orders as wholes: what each asks for, and how much of it is imaged.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -10,15 +11,20 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::out;
 
 use super::client::Operator;
+use super::export::stored;
 use super::files::printable;
 use super::selection::{Common, pages};
 use crate::requests::json::state_name;
+use crate::requests::store::Store;
 
 /// `swath strips orders`.
 #[derive(Debug, Args)]
 pub struct OrdersArgs {
     #[command(flatten)]
     common: Common,
+    /// The store of a mission that need not fly any more: `requests.sqlite` in its output folder.
+    #[arg(long, conflicts_with_all = ["order", "state", "area"])]
+    store: Option<PathBuf>,
     /// Print JSON lines.
     #[arg(long)]
     json: bool,
@@ -116,11 +122,17 @@ fn is_imaged(state: u8) -> bool {
 /// Lists orders, each with how much of it is imaged.
 ///
 /// # Errors
-/// When nobody answers, a filter is refused, or there is no such order.
+/// When nobody answers, the store cannot be read, a filter is refused, or there is no such order.
 pub fn orders(args: &OrdersArgs) -> Result<()> {
-    let operator = Operator::start()?;
+    let statuses = match &args.store {
+        Some(path) => {
+            let statuses = stored(&Store::open_read_only(path)?)?.into_iter().map(|(_, status)| status);
+            statuses.filter(|status| args.common.holds(status)).collect()
+        }
+        None => pages(&Operator::start()?, &args.common)?,
+    };
     let mut wholes: BTreeMap<u64, Whole> = BTreeMap::new();
-    for status in pages(&operator, &args.common)? {
+    for status in statuses {
         wholes.entry(status.order_id).or_default().add(&status);
     }
     if wholes.is_empty() && args.common.is_one_order() {
