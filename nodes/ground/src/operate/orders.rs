@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use swath_mission::requests::lifecycle::State;
 use swath_msgs::swath_msgs as msg;
 use swath_node::out;
+use swath_ros::RosArgs;
 
 use super::client::Operator;
 use super::export::stored;
@@ -123,13 +124,13 @@ fn is_imaged(state: u8) -> bool {
 ///
 /// # Errors
 /// When nobody answers, the store cannot be read, a filter is refused, or there is no such order.
-pub fn orders(args: &OrdersArgs) -> Result<()> {
+pub fn orders(args: &OrdersArgs, ros: &RosArgs) -> Result<()> {
     let statuses = match &args.store {
         Some(path) => {
             let statuses = stored(&Store::open_read_only(path)?)?.into_iter().map(|(_, status)| status);
             statuses.filter(|status| args.common.holds(status)).collect()
         }
-        None => pages(&Operator::start()?, &args.common)?,
+        None => pages(&Operator::start(ros)?, &args.common)?,
     };
     let mut wholes: BTreeMap<u64, Whole> = BTreeMap::new();
     for status in statuses {

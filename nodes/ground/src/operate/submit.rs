@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::graph;
+use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files, cut_json, cut_text, write_file};
@@ -79,10 +79,10 @@ pub struct ReplaceArgs {
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or something is refused.
-pub fn submit(args: &SubmitArgs) -> Result<()> {
+pub fn submit(args: &SubmitArgs, ros: &RosArgs) -> Result<()> {
     args.cutting.usual()?;
     let files = Files::read(&args.files)?;
-    let operator = if args.dry_run || files.shapes() == 0 { None } else { Some(Operator::start()?) };
+    let operator = if args.dry_run || files.shapes() == 0 { None } else { Some(Operator::start(ros)?) };
     let cutting = match &operator {
         Some(operator) => match args.cutting.of_mission(operator) {
             Ok(cutting) => cutting,
@@ -93,7 +93,7 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
             }
         },
         None if files.shapes() == 0 => args.cutting.usual()?,
-        None => args.cutting.of_any()?,
+        None => args.cutting.of_any(ros)?,
     };
     let mut import = files.cut(&cutting);
     for order in &mut import.orders {
@@ -146,8 +146,8 @@ fn taken(result: &msg::SubmitResult) -> String {
 ///
 /// # Errors
 /// When nobody answers or something is refused.
-pub fn cancel(args: &DecideArgs) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn cancel(args: &DecideArgs, ros: &RosArgs) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let Actor { actor, reason } = &args.actor;
     let ids = args.strips.find(&operator)?;
     let call = msg::CancelStripsRequest { ids: ids.clone(), actor: actor.clone(), reason: reason.clone() };
@@ -160,8 +160,8 @@ pub fn cancel(args: &DecideArgs) -> Result<()> {
 ///
 /// # Errors
 /// When nobody answers or something is refused.
-pub fn review(args: &DecideArgs, action: u8) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn review(args: &DecideArgs, ros: &RosArgs, action: u8) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let Actor { actor, reason } = &args.actor;
     let ids = args.strips.find(&operator)?;
     let call = msg::ReviewStripsRequest { ids: ids.clone(), action, actor: actor.clone(), reason: reason.clone() };
@@ -189,12 +189,12 @@ fn tell(args: &DecideArgs, ids: &[u64], done: &str, results: &[msg::SubmitResult
 ///
 /// # Errors
 /// When the file does not hold one line or area, or several strips for one, when nobody answers, or something is refused.
-pub fn replace(args: &ReplaceArgs) -> Result<()> {
+pub fn replace(args: &ReplaceArgs, ros: &RosArgs) -> Result<()> {
     let files = Files::read(std::slice::from_ref(&args.file))?;
     if files.shapes() != 1 {
         bail!("{} holds {} lines and areas: one is needed in the place of one", args.file.display(), files.shapes());
     }
-    let operator = Operator::start()?;
+    let operator = Operator::start(ros)?;
     let mut import = files.cut(&args.cutting.of_mission(&operator)?);
     for order in &mut import.orders {
         order.submitter.clone_from(&args.submitter);

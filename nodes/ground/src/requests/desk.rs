@@ -252,8 +252,8 @@ fn get(
             return Ok(msg::GetStripResponse { reason_code, reason, ..Default::default() });
         }
     };
-    let mut attempts: Vec<_> = store.attempts(id)?.iter().map(messages::attempt).collect();
-    attempts.extend(messages::attempt_under_way(logic, id));
+    let mut attempts: Vec<_> = store.attempts(id)?.iter().map(|it| messages::attempt(&base.stamper, it)).collect();
+    attempts.extend(messages::attempt_under_way(&base.stamper, logic, id));
     let history = store.history(id)?;
     let report = msg::StripReport {
         status: messages::strip_status(&base.stamper, logic, id, request),

@@ -267,9 +267,11 @@ pub fn opportunity(stamper: &Stamper, opportunity: &Opportunity) -> msg::Opportu
         window_open: stamper.time(opportunity.window.open),
         window_close: stamper.time(opportunity.window.close),
         t_acq_ticks: opportunity.t_acq,
+        t_acq_s: stamper.seconds(opportunity.t_acq),
         min_elevation: opportunity.min_elevation,
         transition_found: opportunity.transition.is_some(),
         transition_ticks: opportunity.transition.unwrap_or(0),
+        transition_s: stamper.seconds(opportunity.transition.unwrap_or(0)),
         conflicts: u32::try_from(opportunity.conflicts).unwrap_or(u32::MAX),
         conflict_ids: opportunity.conflict_ids.iter().map(|id| id.0).collect::<Vec<_>>(),
     }
@@ -277,7 +279,7 @@ pub fn opportunity(stamper: &Stamper, opportunity: &Opportunity) -> msg::Opportu
 
 /// An attempt that has ended.
 #[must_use]
-pub fn attempt(attempt: &Attempt) -> msg::Attempt {
+pub fn attempt(stamper: &Stamper, attempt: &Attempt) -> msg::Attempt {
     let (state, reason_code) = match attempt.outcome {
         Outcome::Succeeded => (msg::Attempt::STATE_SUCCEEDED, 0),
         Outcome::Cancelled => (msg::Attempt::STATE_CANCELLED, 0),
@@ -288,6 +290,8 @@ pub fn attempt(attempt: &Attempt) -> msg::Attempt {
         task: attempt.task,
         start_tick: attempt.start.0,
         end_tick: attempt.end.0,
+        start: stamper.time(attempt.start),
+        end: stamper.time(attempt.end),
         t_pre_ticks: attempt.t_pre,
         t_acq_ticks: attempt.t_acq,
         state,
@@ -300,7 +304,7 @@ pub fn attempt(attempt: &Attempt) -> msg::Attempt {
 
 /// The attempt that is under way for a strip.
 #[must_use]
-pub fn attempt_under_way(logic: &RequestLogic, id: StripId) -> Option<msg::Attempt> {
+pub fn attempt_under_way(stamper: &Stamper, logic: &RequestLogic, id: StripId) -> Option<msg::Attempt> {
     let flown = logic.progress().in_flight.filter(|flown| flown.id == id)?;
     let state = match (logic.state(id)?, logic.now() < flown.start) {
         (State::Executing, _) => msg::Attempt::STATE_ACQUIRING,
@@ -311,6 +315,7 @@ pub fn attempt_under_way(logic: &RequestLogic, id: StripId) -> Option<msg::Attem
         strip_id: id.0,
         task: flown.task,
         start_tick: flown.start.0,
+        start: stamper.time(flown.start),
         t_pre_ticks: flown.t_pre,
         t_acq_ticks: flown.t_acq,
         state,
