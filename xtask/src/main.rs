@@ -1,10 +1,11 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|bench`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|bench|wheel|soak`.
 
 mod bench;
 mod libtorch;
 mod prerequisites;
 mod process;
 mod venv;
+mod wheel;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -20,11 +21,13 @@ usage: cargo xtask COMMAND
 
   setup [--test]   make what is missing: the libtorch view (one download of
                    543 MB), and with --test the Python environment of the tests
-  test [ARGS…]     set up, then run every test of the workspace; ARGS go to
-                   `cargo test`
+  test [ARGS…]     set up, then run every test of the workspace and of the
+                   Python package; with ARGS, `cargo test ARGS…` alone
   mission [ARGS…]  set up, build, and fly examples/missions/one_orbit.toml; ARGS
                    go to `swath launch` (--help shows them)
   bench            run every crate's measurements and print one JSON object
+  wheel            build the Python package into target/wheels
+  soak python      run the Python package's long examples; they fetch gigabytes
 ";
 
 fn main() -> ExitCode {
@@ -48,6 +51,8 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("test") => test(&root, rest),
         Some("mission") => mission(&root, rest),
         Some("bench") => bench(&root, rest),
+        Some("wheel") => wheel(&root, rest),
+        Some("soak") => soak(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
             Ok(())
@@ -82,7 +87,37 @@ fn test(root: &Path, args: &[OsString]) -> Result<()> {
     let mut cargo = process::cargo(root, "test");
     cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));
-    process::run(&mut cargo)
+    process::run(&mut cargo)?;
+    if !args.is_empty() {
+        return Ok(());
+    }
+    let wheel = wheel::build(root)?;
+    wheel::install(root, &wheel)?;
+    wheel::test(root, &wheel)
+}
+
+fn wheel(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("wheel takes no arguments\n\n{USAGE}");
+    }
+    python_tools(root)?;
+    eprintln!("built {}", wheel::build(root)?.display());
+    Ok(())
+}
+
+fn soak(root: &Path, args: &[OsString]) -> Result<()> {
+    if args != ["python"] {
+        bail!("soak takes `python`\n\n{USAGE}");
+    }
+    python_tools(root)?;
+    wheel::soak(root)
+}
+
+/// What builds a wheel, without libtorch.
+fn python_tools(root: &Path) -> Result<()> {
+    prerequisites::check()?;
+    let _lock = process::lock(root)?;
+    venv::ensure(root)
 }
 
 /// Builds all nodes and the recorder, then becomes `swath launch`.

@@ -10,11 +10,11 @@ use crate::world::frames::{earth_to_inertial, hill_dcm, reference_dcm};
 use crate::world::turn::Turn;
 
 /// Scale of the attitude error rate [rad/s].
-const RATE_SCALE: f64 = 0.05;
+pub const RATE_SCALE: f64 = 0.05;
 /// Scale of times relative to now [s].
-const WINDOW_SCALE_S: f64 = 300.0;
+pub const WINDOW_SCALE_S: f64 = 300.0;
 /// Scale of the wheels' momentum [N m s]: that of a wheel at 1500 rpm.
-const MOMENTUM_SCALE: f64 = 12.5;
+pub const MOMENTUM_SCALE: f64 = 12.5;
 
 /// Which features a policy sees of each strip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
