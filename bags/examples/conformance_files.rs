@@ -1,7 +1,7 @@
 //! Writes the 416 files of MCAP's public conformance suite: `conformance_files DIRECTORY`.
 #![allow(clippy::unwrap_used, reason = "an example that cannot go on should panic")]
 
-#[path = "../tests/common/conformance.rs"]
+#[path = "../tests/it/common/conformance.rs"]
 mod conformance;
 
 use std::{env, fs, path::PathBuf};

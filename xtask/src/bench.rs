@@ -4,62 +4,27 @@
 
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 use serde_json::{Map, Value};
 
-use crate::process;
+use crate::{examples, process};
 
 /// Builds all binaries, runs each crate's measurements in turn and prints the union.
 pub fn run(root: &Path) -> Result<()> {
     process::run(process::cargo(root, "build").args(["--quiet", "--release", "--workspace", "--bins"]))?;
     let mut all = Map::new();
-    for (package, example) in benches(root)? {
+    for (package, example) in examples::with_prefix(root, "bench_")? {
         eprintln!("measuring {package}");
         let mut cargo = process::cargo(root, "run");
         cargo.args(["--quiet", "--release", "--package", &package, "--example", &example]);
-        let measured = output(&mut cargo)?;
+        let measured = examples::output(&mut cargo)?;
         let object = serde_json::from_slice(&measured)
             .with_context(|| format!("{example} of {package} did not print one JSON object"))?;
         merge(&mut all, object)?;
     }
     let text = serde_json::to_string_pretty(&all).context("cannot print the measurements")?;
     writeln!(std::io::stdout(), "{text}").context("cannot print the measurements")
-}
-
-/// Every example whose name begins with `bench_`, as package and example.
-fn benches(root: &Path) -> Result<Vec<(String, String)>> {
-    let mut cargo = process::cargo(root, "metadata");
-    cargo.args(["--no-deps", "--format-version", "1"]);
-    let metadata: Value = serde_json::from_slice(&output(&mut cargo)?).context("cargo metadata did not print JSON")?;
-    let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
-    let mut found = Vec::new();
-    for package in packages {
-        for target in package["targets"].as_array().into_iter().flatten().filter(|target| is_bench(target)) {
-            if let (Some(package), Some(example)) = (package["name"].as_str(), target["name"].as_str()) {
-                found.push((package.to_owned(), example.to_owned()));
-            }
-        }
-    }
-    found.sort();
-    Ok(found)
-}
-
-fn is_bench(target: &Value) -> bool {
-    let is_example = target["kind"].as_array().is_some_and(|kinds| kinds.contains(&"example".into()));
-    is_example && target["name"].as_str().is_some_and(|name| name.starts_with("bench_"))
-}
-
-fn output(command: &mut Command) -> Result<Vec<u8>> {
-    let output = command
-        .stderr(Stdio::inherit())
-        .output()
-        .with_context(|| format!("cannot start {:?}", command.get_program()))?;
-    if !output.status.success() {
-        bail!("{command:?} failed: {}", output.status);
-    }
-    Ok(output.stdout)
 }
 
 fn merge(all: &mut Map<String, Value>, object: Map<String, Value>) -> Result<()> {

@@ -1,9 +1,12 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|bench|wheel|soak`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|wheel|soak`.
 
 mod bench;
+mod examples;
 mod libtorch;
+mod lint;
 mod prerequisites;
 mod process;
+mod soak;
 mod venv;
 mod wheel;
 
@@ -25,8 +28,13 @@ usage: cargo xtask COMMAND
                    Python package; with ARGS, `cargo test ARGS…` alone
   mission [ARGS…]  set up, build, and fly examples/missions/one_orbit.toml; ARGS
                    go to `swath launch` (--help shows them)
+  lint             check format, clippy, licences and sources of dependencies, and
+                   that all of them are used; builds the tools that are missing
   bench            run every crate's measurements and print one JSON object
   wheel            build the Python package into target/wheels
+  soak [NAME [SEEDS]]
+                   run a long figure to its end and print it as JSON; one that was
+                   stopped goes on; without a name, list them
   soak python      run the Python package's long examples; they fetch gigabytes
 ";
 
@@ -50,6 +58,7 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("setup") => setup(&root, with_tests(rest)?),
         Some("test") => test(&root, rest),
         Some("mission") => mission(&root, rest),
+        Some("lint") => lint(&root, rest),
         Some("bench") => bench(&root, rest),
         Some("wheel") => wheel(&root, rest),
         Some("soak") => soak(&root, rest),
@@ -80,10 +89,10 @@ fn setup(root: &Path, tests: bool) -> Result<()> {
 }
 
 /// Runs every test in the release profile: what is tested is what is flown, and one build serves both commands. Programs
-/// come first: tests run those of other packages too, which cargo does not build for them.
+/// and examples come first: tests run those of other packages too, which cargo does not build for them.
 fn test(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, true)?;
-    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins"]))?;
+    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins", "--examples"]))?;
     let mut cargo = process::cargo(root, "test");
     cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));
@@ -103,14 +112,6 @@ fn wheel(root: &Path, args: &[OsString]) -> Result<()> {
     python_tools(root)?;
     eprintln!("built {}", wheel::build(root)?.display());
     Ok(())
-}
-
-fn soak(root: &Path, args: &[OsString]) -> Result<()> {
-    if args != ["python"] {
-        bail!("soak takes `python`\n\n{USAGE}");
-    }
-    python_tools(root)?;
-    wheel::soak(root)
 }
 
 /// What builds a wheel, without libtorch.
@@ -137,6 +138,23 @@ fn bench(root: &Path, args: &[OsString]) -> Result<()> {
     }
     setup(root, false)?;
     bench::run(root)
+}
+
+fn lint(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("lint takes no arguments\n\n{USAGE}");
+    }
+    setup(root, false)?;
+    lint::run(root)
+}
+
+fn soak(root: &Path, args: &[OsString]) -> Result<()> {
+    if args == ["python"] {
+        python_tools(root)?;
+        return wheel::soak(root);
+    }
+    setup(root, true)?;
+    soak::run(root, args)
 }
 
 fn repository_root() -> Result<PathBuf> {

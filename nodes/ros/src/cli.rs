@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde_yaml_ng::Value as Yaml;
 use tracing::Level;
+use yaml_serde::Value as Yaml;
 
 use crate::error::RosError;
 use crate::names::Names;
@@ -123,7 +123,7 @@ impl RosArgs {
     fn parameter_file(&mut self, path: &Path) -> Result<(), RosError> {
         let failed = |reason: String| RosError::ParameterFile { path: path.display().to_string(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-        let yaml: Yaml = serde_yaml_ng::from_str(&text).map_err(|error| failed(error.to_string()))?;
+        let yaml: Yaml = yaml_serde::from_str(&text).map_err(|error| failed(error.to_string()))?;
         self.overrides.extend(read_nodes("", &yaml).map_err(failed)?);
         Ok(())
     }
@@ -356,7 +356,7 @@ swath:
 other:
   ros__parameters: {pace: 4.0}
 ";
-        let overrides = read_nodes("", &serde_yaml_ng::from_str(yaml).unwrap()).unwrap();
+        let overrides = read_nodes("", &yaml_serde::from_str(yaml).unwrap()).unwrap();
         let args = RosArgs { overrides, ..Default::default() };
         let spacecraft = args.overrides(&Names::new("/swath", "spacecraft", &[]).unwrap());
         assert_eq!(spacecraft["pace"], Value::Double(2.0));
@@ -366,9 +366,9 @@ other:
         let guidance = args.overrides(&Names::new("/swath", "guidance", &[]).unwrap());
         assert_eq!(guidance["pace"], Value::Double(3.0));
         assert_eq!(guidance.len(), 2);
-        let bad: Yaml = serde_yaml_ng::from_str("a: {ros__parameters: {b: [1, x]}}").unwrap();
+        let bad: Yaml = yaml_serde::from_str("a: {ros__parameters: {b: [1, x]}}").unwrap();
         assert_eq!(read_nodes("", &bad).unwrap_err(), "`b`: the items of the list are not all of one type");
-        let bad: Yaml = serde_yaml_ng::from_str("a: 1").unwrap();
+        let bad: Yaml = yaml_serde::from_str("a: 1").unwrap();
         assert_eq!(read_nodes("", &bad).unwrap_err(), "`a` is not a mapping of nodes");
     }
 }

@@ -1,7 +1,7 @@
 //! Values of parameters: as ROS types them, as YAML writes them, as Rust reads them.
 
-use serde_yaml_ng::Value as Yaml;
 use swath_msgs::rcl_interfaces::{ParameterType, ParameterValue};
+use yaml_serde::Value as Yaml;
 
 /// The value of a parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,7 +75,7 @@ impl Value {
 
     /// The value written as text, as after `-p name:=`.
     pub fn from_text(text: &str) -> Result<Self, String> {
-        let yaml: Yaml = serde_yaml_ng::from_str(text).map_err(|error| error.to_string())?;
+        let yaml: Yaml = yaml_serde::from_str(text).map_err(|error| error.to_string())?;
         Self::from_yaml(&yaml)
     }
 

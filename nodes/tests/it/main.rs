@@ -5,6 +5,7 @@ mod bad_input;
 mod bag;
 mod clients;
 mod common;
+mod examples;
 mod killed;
 mod operators_day;
 mod parity;

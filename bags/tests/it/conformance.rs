@@ -1,25 +1,22 @@
 //! MCAP's public conformance suite: 416 files, each told, printed, filtered and recovered as it is, and read alike by
 //! the reader of the `mcap` crate.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
-use common::{
-    conformance::{Content, File, files},
-    contents::{Found, found},
-};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use swath_bags::{
     Bag, BagOptions, Compression, Filter, ReadOptions,
     ops::{cat::cat, copy::filter, info::info, recover::recover},
+};
+
+use crate::common::{
+    conformance::{Content, File, files},
+    contents::{Found, found},
 };
 
 /// Chunks that the `mcap` crate reads without its features.
@@ -52,7 +49,7 @@ fn defined(content: &Content) -> Found {
 
 #[test]
 fn the_files_are_those_of_the_suite() {
-    let digests = include_str!("data/conformance.sha256").lines();
+    let digests = include_str!("../data/conformance.sha256").lines();
     let digests: BTreeMap<&str, &str> =
         digests.map(|l| l.split_once("  ").map(|(hash, name)| (name, hash)).unwrap()).collect();
     let files = files();

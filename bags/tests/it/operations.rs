@@ -1,12 +1,7 @@
 //! Filtering, merging, recovering, validating and printing bags, as library calls.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{fs, path::Path, time::Duration};
 
-use common::{TICK, cdr, state, topic, write_sample};
 use swath_bags::{
     Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
     ops::{
@@ -19,6 +14,8 @@ use swath_bags::{
     qos::QosProfile,
 };
 use swath_msgs::swath_msgs::SpacecraftState;
+
+use crate::common::{TICK, cdr, state, topic, write_sample};
 
 const TICKS: u64 = 200;
 

@@ -1,20 +1,11 @@
 //! The player as a process, with subscriptions around it.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     fs::{self, File},
     path::Path,
     process::{Command, Stdio},
 };
 
-use common::{
-    TICK, cdr,
-    program::{PATIENCE, Program, call, client, node, wait_until},
-    stamp, state, write_sample,
-};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use swath_bags::{Bag, BagOptions, BagWriter, Filter, qos::QosProfile as BagQos};
 use swath_msgs::{
@@ -28,6 +19,12 @@ use swath_msgs::{
 use swath_ros::{
     Node, RawSample, RawSubscription, Subscription, graph,
     qos::{Durability, History, QosProfile},
+};
+
+use crate::common::{
+    TICK, cdr,
+    program::{PATIENCE, Program, call, client, node, wait_until},
+    stamp, state, topic, write_sample,
 };
 
 const TICKS: u64 = 400;
@@ -279,7 +276,7 @@ fn keys_pause_and_step() {
 /// A bag whose second message comes a year after its first.
 fn stretched(dir: &Path) {
     let bag = BagWriter::create(&dir.join("bag"), BagOptions::default()).unwrap();
-    let states = bag.add_topic(&common::topic::<SpacecraftState>(STATES, BagQos::reliable(10))).unwrap();
+    let states = bag.add_topic(&topic::<SpacecraftState>(STATES, BagQos::reliable(10))).unwrap();
     for (tick, time) in [(0, 0), (1, 31_536_000_000_000_000)] {
         bag.write(states, time, time, &cdr(&state(tick))).unwrap();
     }

@@ -1,12 +1,8 @@
 //! Damaged bags of every kind: no panic, no message out of thin air, whatever the bytes are.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::path::Path;
 
-use common::mutate::{mutated, read, samples, save};
+use crate::common::mutate::{mutated, read, samples, save};
 
 /// Bags that are read, and those of them that are also recovered and filtered.
 const READ: u64 = 60_000;

@@ -1,21 +1,18 @@
 //! All test bags of rosbag2, from a clone of its repository.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     env, fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use common::python;
 use serde_json::Value;
 use swath_bags::{
     Bag, BagOptions, Filter, ReadOptions,
     ops::{copy::filter, validate::validate},
 };
+
+use crate::common::python;
 
 /// Files of a kind below a folder.
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {

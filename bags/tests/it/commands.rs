@@ -1,17 +1,14 @@
 //! The commands as processes: what they print and how they exit.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     os::unix::fs::PermissionsExt,
     path::Path,
     process::{Command, Output, Stdio},
 };
 
-use common::{cdr, state, write_sample};
 use swath_bags::{Bag, BagOptions, metadata::BagInformation, qos::Durability};
+
+use crate::common::{cdr, state, write_sample};
 
 fn swath_bag(dir: &Path, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));

@@ -1,16 +1,11 @@
 //! Bags of others: what rosbag2 of every version, other writers of MCAP, and accidents leave.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use common::{cdr, contents::found, run_python};
 use serde_json::{Value, json};
 use swath_bags::{
     Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
@@ -25,6 +20,8 @@ use swath_bags::{
     qos::{Durability, QosProfile},
 };
 use swath_msgs::{rosgraph_msgs::Clock, std_msgs::Header};
+
+use crate::common::{cdr, contents::found, run_python, topic};
 
 /// The start of most of these bags [ns].
 const START: u64 = 1_700_000_000_000_000_000;
@@ -418,8 +415,8 @@ fn sqlite_bags_are_read_as_mcap_bags_are() {
 /// A bag of two topics whose chunks hold one topic each; the offset of each chunk's record.
 fn two_topics(dir: &Path) -> Vec<usize> {
     let bag = BagWriter::create(dir, BagOptions { chunk_bytes: 100, ..plain() }).unwrap();
-    let clock = bag.add_topic(&common::topic::<Clock>("/clock", QosProfile::reliable(1))).unwrap();
-    let header = bag.add_topic(&common::topic::<Header>("/header", QosProfile::reliable(1))).unwrap();
+    let clock = bag.add_topic(&topic::<Clock>("/clock", QosProfile::reliable(1))).unwrap();
+    let header = bag.add_topic(&topic::<Header>("/header", QosProfile::reliable(1))).unwrap();
     for (topic, message) in [(clock, cdr(&Clock::default())), (header, cdr(&Header::default()))] {
         for time in 0..20 {
             bag.write(topic, time, time, &message).unwrap();

@@ -1,16 +1,13 @@
 //! Truncated, bit-flipped and foreign files: errors that name offset and reason, never a panic.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{fs, path::Path};
 
-use common::write_sample;
 use swath_bags::{
     Bag, BagError, BagOptions, Compression, Filter, ReadOptions,
     ops::{recover::recover, validate::validate},
 };
+
+use crate::common::write_sample;
 
 /// A small bag's only file.
 fn sample(dir: &Path, compression: Compression) -> Vec<u8> {

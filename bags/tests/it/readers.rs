@@ -1,12 +1,9 @@
 //! Readers that others wrote accept our bags: PyPI `rosbags`, `mcap` and `mcap-ros2-support`.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
-use common::{TICK, run_python, write_sample};
 use serde_json::Value;
 use swath_bags::{BagOptions, Compression};
+
+use crate::common::{TICK, run_python, write_sample};
 
 const TICKS: u64 = 300;
 

@@ -1,18 +1,11 @@
 //! The generator: what it reads, what it refuses, and the hashes it computes.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-#[path = "../build/describe.rs"]
-mod describe;
-#[path = "../build/emit.rs"]
-mod emit;
-#[path = "../build/model.rs"]
-mod model;
-#[path = "../build/parse.rs"]
-mod parse;
-
-use describe::Catalogue;
-use model::{Base, Primitive, Shape, Value};
-use swath_msgs::definition;
+use crate::{
+    describe::{self, Catalogue},
+    emit,
+    model::{Base, Primitive, Shape, Value},
+    parse,
+};
 
 fn catalogue(files: &[(&str, &str, &str)]) -> Catalogue {
     files
@@ -110,8 +103,8 @@ fn an_empty_half_of_a_service_gets_the_placeholder_member() {
 #[test]
 fn service_hashes_are_those_of_ros_2() {
     let known = catalogue(&[
-        ("builtin_interfaces", "Time", include_str!("../standard/builtin_interfaces/msg/Time.msg")),
-        ("service_msgs", "ServiceEventInfo", include_str!("../standard/service_msgs/msg/ServiceEventInfo.msg")),
+        ("builtin_interfaces", "Time", include_str!("../../standard/builtin_interfaces/msg/Time.msg")),
+        ("service_msgs", "ServiceEventInfo", include_str!("../../standard/service_msgs/msg/ServiceEventInfo.msg")),
     ]);
     let text = "int64 a # A.\nint64 b # B.\n---\nint64 sum # Sum.\n";
     let service = parse::service("example_interfaces", "AddTwoInts", text).unwrap();

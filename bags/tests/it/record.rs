@@ -1,9 +1,5 @@
 //! The recorder as a process, with publishers around it.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     fs,
     path::Path,
@@ -11,11 +7,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{
-    TICK, cdr,
-    program::{PATIENCE, Program, call, client, node, wait_until},
-    stamp, state,
-};
 use swath_bags::{
     Bag, Filter, ReadOptions, Topic, TopicPattern,
     ops::validate::validate,
@@ -34,6 +25,12 @@ use swath_msgs::{
 use swath_ros::{
     Cdr, Environment, Mapping, Node, RosArgs, Subscription, graph,
     qos::{History, QosProfile, WhenFull},
+};
+
+use crate::common::{
+    TICK, cdr,
+    program::{PATIENCE, Program, call, client, node, wait_until},
+    stamp, state,
 };
 
 /// A recorder that is ready; its bag is `dir/bag`.

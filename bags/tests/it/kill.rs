@@ -1,9 +1,5 @@
 //! A killed writer, or recorder, loses no more than the last second.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test that cannot go on should panic")]
-
-mod common;
-
 use std::{
     env,
     fs::{self, File},
@@ -14,15 +10,16 @@ use std::{
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
-use common::{
-    program::{Program, node, wait_until},
-    state,
-};
 use swath_bags::{
     Bag, BagOptions, BagWriter, ReadOptions, Topic,
     ops::{recover::recover, validate::validate},
 };
 use swath_ros::graph;
+
+use crate::common::{
+    program::{Program, node, wait_until},
+    state,
+};
 
 /// Where the child writes its bag; without it the child's part is no test.
 const BAG: &str = "SWATH_TEST_KILLED_BAG";
@@ -56,7 +53,7 @@ fn heartbeat(bag: &Path) -> PathBuf {
 
 fn child(dir: &Path) -> Child {
     let mut command = Command::new(env::current_exe().unwrap());
-    command.args(["--exact", "write_until_killed"]).env(BAG, dir);
+    command.args(["--exact", "kill::write_until_killed"]).env(BAG, dir);
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
