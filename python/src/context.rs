@@ -16,7 +16,7 @@ use swath_sim::world::frames::{earth_to_inertial, latitude_longitude_deg};
 use swath_sim::world::orbit::Orbit;
 
 use crate::errors::refused;
-use crate::flight::task_row;
+use crate::records::task_row;
 
 /// Decides to image a strip.
 #[pyclass(frozen, eq, get_all, module = "swath._swath", skip_from_py_object)]
@@ -73,6 +73,9 @@ impl Wait {
         self.duration_s
     }
 }
+
+/// Features of N strips, and which of the N there are.
+type Seen<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<bool>>);
 
 /// What a decision rests on, as it stood when it was asked for.
 #[pyclass(frozen, module = "swath._swath")]
@@ -198,11 +201,7 @@ impl Context {
 
     /// What a learned policy sees: features of N strips, and which of the N there are.
     #[pyo3(signature = (observation="table1"))]
-    fn observe<'py>(
-        &self,
-        py: Python<'py>,
-        observation: &str,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<bool>>)> {
+    fn observe<'py>(&self, py: Python<'py>, observation: &str) -> PyResult<Seen<'py>> {
         let set: ObservationSet =
             toml::Value::String(observation.to_owned()).try_into().map_err(|error: toml::de::Error| refused(&error))?;
         let slots = self.model.config.planning.candidates;

@@ -12,8 +12,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::context::Context;
 use crate::errors::{failed, refused};
 use crate::lane::{Flown, Lane, LaneError, Order};
+use crate::requests;
 use crate::settings::Settings;
-use crate::strips;
 
 /// Most episodes side by side.
 const LANES_MAX: usize = 65_536;
@@ -123,7 +123,7 @@ impl Episodes {
     #[pyo3(signature = (number=0))]
     fn strips<'py>(&self, py: Python<'py>, number: usize) -> PyResult<Bound<'py, PyDict>> {
         let lanes = self.lanes();
-        strips::table(py, lane(&lanes, number)?.env().map_err(|error| failed(&error))?.catalogue())
+        requests::table(py, lane(&lanes, number)?.env().map_err(|error| failed(&error))?.catalogue())
     }
 
     fn __len__(&self) -> usize {

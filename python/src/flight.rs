@@ -1,18 +1,18 @@
 //! Whole missions flown by planners.
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyList;
 use pythonize::pythonize;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
+use swath_sim::error::SimError;
 use swath_sim::learn::score::Score;
 use swath_sim::planner::PlannerError;
-use swath_sim::task::{FailureReason, SettledTask, TaskRecord, Totals};
-use swath_sim::time::TickPeriod;
+use swath_sim::task::{SettledTask, Totals};
 
 use crate::errors::{failed, refused};
-use crate::lane::LaneError;
 use crate::planner::{Asked, Pilot};
+use crate::records::task_row;
 use crate::settings::Settings;
 
 /// Flies the mission of a seed to its end: its score, and a row for each task.
@@ -72,7 +72,7 @@ pub fn evaluate<'py>(
 /// Why a mission was not flown to its end.
 enum Failed {
     /// Its settings.
-    Settings(LaneError),
+    Settings(SimError),
     /// Its planner.
     Planner(Pilot, PlannerError),
     /// No planner.
@@ -103,29 +103,5 @@ fn mission(asked: &Asked, settings: &Settings, seed: u64, mut each: impl FnMut(&
     match flown {
         Ok(()) => Ok(Score::of(&env, &totals, settings.episode().orbits, seed, settings.asked(seed))),
         Err(error) => Err(Failed::Planner(pilot, error)),
-    }
-}
-
-/// A task as a row of a table.
-pub fn task_row<'py>(py: Python<'py>, record: &TaskRecord, period: TickPeriod) -> PyResult<Bound<'py, PyDict>> {
-    let row = PyDict::new(py);
-    row.set_item("task", record.task)?;
-    row.set_item("start_s", period.time_s(record.start))?;
-    row.set_item("end_s", period.time_s(record.end))?;
-    row.set_item("strip", record.strip.map(|it| it.0))?;
-    row.set_item("t_pre_s", period.duration_s(record.t_pre))?;
-    row.set_item("t_acq_s", period.duration_s(record.t_acq))?;
-    row.set_item("success", record.success())?;
-    row.set_item("failure", record.outcome.failure.map(failure_name))?;
-    row.set_item("max_attitude_error", record.outcome.max_attitude_error)?;
-    row.set_item("min_elevation_deg", record.outcome.min_elevation.to_degrees())?;
-    Ok(row)
-}
-
-fn failure_name(reason: FailureReason) -> &'static str {
-    match reason {
-        FailureReason::Attitude => "attitude",
-        FailureReason::Elevation => "elevation",
-        FailureReason::Interrupted => "interrupted",
     }
 }

@@ -3,9 +3,9 @@
 use swath_sim::error::SimError;
 use swath_sim::learn::episode::Env;
 use swath_sim::learn::hybrid::{Action, Episode, LearnError, ObservationShape, Progress};
-use swath_sim::task::FailureReason;
 use thiserror::Error;
 
+use crate::records::failure_number;
 use crate::settings::Settings;
 
 /// Why an episode cannot begin or go on.
@@ -147,14 +147,5 @@ impl Lane {
             failure: outcome.failure.map_or(0, failure_number),
             strip,
         })
-    }
-}
-
-/// Number of a reason, as `swath.Failure` has it.
-pub fn failure_number(reason: FailureReason) -> i64 {
-    match reason {
-        FailureReason::Attitude => 1,
-        FailureReason::Elevation => 2,
-        FailureReason::Interrupted => 3,
     }
 }

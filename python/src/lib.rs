@@ -10,6 +10,8 @@ mod errors;
 mod flight;
 mod lane;
 mod planner;
+mod records;
+mod requests;
 mod settings;
 mod strips;
 

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pythonize::{depythonize, pythonize};
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
+use swath_sim::error::SimError;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
@@ -18,8 +19,7 @@ use toml::{Table, Value};
 
 use crate::bounds;
 use crate::errors::refused;
-use crate::lane::LaneError;
-use crate::strips;
+use crate::requests;
 
 /// The settings by the names that they have in a run of `swath-train`, and errors of the plant.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -61,7 +61,7 @@ impl Settings {
         keys.episode.validate().map_err(|error| refused(&error))?;
         let model = Arc::new(Model::new(keys.simulation.clone()).map_err(|error| refused(&error))?);
         keys.plant.plant(&model).map_err(|error| refused(&error))?;
-        let strips = strips.map(|list| strips::requests(list, &model.config)).transpose()?;
+        let strips = strips.map(|list| requests::read(list, &model.config)).transpose()?;
         Ok(Self { keys, model, strips: strips.map(Arc::from) })
     }
 
@@ -122,7 +122,7 @@ impl Settings {
     ///
     /// # Errors
     /// Errors of the plant that are out of range.
-    pub fn env(&self, seed: u64) -> Result<Env, LaneError> {
+    pub fn env(&self, seed: u64) -> Result<Env, SimError> {
         let (model, episode) = (self.model.clone(), &self.keys.episode);
         let mut env = match &self.strips {
             Some(strips) => Env::with_strips(model, episode.orbits, strips, seed),

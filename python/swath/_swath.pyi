@@ -10,6 +10,19 @@ from numpy.typing import NDArray
 from swath.missions import Score, Task
 from swath.strips import Strip
 
+__all__ = [
+    "Context",
+    "Episodes",
+    "Image",
+    "Settings",
+    "Wait",
+    "evaluate",
+    "feature_collection",
+    "fly",
+    "random_strips",
+    "read_strips",
+]
+
 @final
 class Settings:
     """Settings that were checked: of a TOML file, changed by ``keys``, with ``strips`` instead of random ones.

@@ -18,7 +18,7 @@ from swath._swath import Context, Episodes, Settings
 #: What an agent sees: a row of features for each of N slots; slots without a strip are zero.
 Observation = NDArray[np.float32]
 #: Which strip, and the transition before it over the longest one.
-Action = tuple[np.int64, NDArray[np.float32]]
+Action = tuple[np.int64, NDArray[np.floating[Any]]]
 
 
 class Failure(IntEnum):
@@ -40,12 +40,13 @@ class Order(IntEnum):
     RESET = 2
 
 
-def spaces_of(settings: Settings) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Tuple]:
+def spaces_of(settings: Settings) -> tuple[gymnasium.Space[Observation], gymnasium.Space[Action]]:
     """Observation space and action space of one environment."""
     low, high = (np.tile(bound, (settings.candidates, 1)) for bound in settings.bounds())
     parameter = gymnasium.spaces.Box(0.0, 1.0, (1,), np.float32)
-    actions = gymnasium.spaces.Tuple((gymnasium.spaces.Discrete(settings.candidates), parameter))
-    return gymnasium.spaces.Box(low, high, dtype=np.float32), actions
+    actions: gymnasium.Space[Any] = gymnasium.spaces.Tuple((gymnasium.spaces.Discrete(settings.candidates), parameter))
+    observations: gymnasium.Space[Any] = gymnasium.spaces.Box(low, high, dtype=np.float32)
+    return observations, actions
 
 
 class StripImagingEnv(gymnasium.Env[Observation, Action]):
@@ -156,7 +157,7 @@ class StripImagingEnv(gymnasium.Env[Observation, Action]):
         mask[: len(self.context)] = True
         return mask
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """A map with the strips and the ground track, rows × columns × RGB."""
         if self.render_mode is None:
             return None

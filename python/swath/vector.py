@@ -21,7 +21,7 @@ from swath.environment import Order, spaces_of
 #: What agents see: environments × N × features.
 Observations = NDArray[np.float32]
 #: Strips chosen, and transitions over the longest one, one row for each environment.
-Actions = tuple[NDArray[np.int64], NDArray[np.float32]]
+Actions = tuple[NDArray[np.int64], NDArray[np.floating[Any]]]
 Flags = NDArray[np.bool_]
 
 

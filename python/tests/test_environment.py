@@ -80,7 +80,7 @@ def test_steps_tell_what_came_of_them(short: dict[str, Any]) -> None:
     for _ in range(40):
         before = info["time_s"]
         first = int(env.context.strip[0])
-        _, reward, terminated, truncated, info = env.step((np.int64(0), np.float32([0.7])))
+        _, reward, terminated, truncated, info = env.step((np.int64(0), np.array([0.7])))
         assert info["strip"] == first
         assert info["time_s"] - before == pytest.approx(info["duration_s"])
         assert info["success"] == (info["failure"] == swath.Failure.NONE) == (float(reward) > 0)
@@ -160,7 +160,7 @@ def test_plants_that_differ_fly_differently(short: dict[str, Any]) -> None:
     def rewards(**more: Any) -> list[float]:
         env = make(**short, **more)
         env.reset(seed=3)
-        return [float(env.step((np.int64(k % 40), np.float32([0.6])))[1]) for k in range(25)]
+        return [float(env.step((np.int64(k % 40), np.array([0.6])))[1]) for k in range(25)]
 
     assert rewards() == rewards(plant={"torque_limit_scale": 1.0}) != rewards(plant="torque-10%,noise,delay")
 
@@ -185,7 +185,7 @@ def test_the_picture_shows_strips_and_track(short: dict[str, Any]) -> None:
     first = env.render()
     assert first is not None and first.shape == (360, 720, 3) and first.dtype == np.uint8
     for _ in range(30):
-        env.step((np.int64(0), np.float32([1.0])))
+        env.step((np.int64(0), np.array([1.0])))
     then = env.render()
     assert then is not None
 

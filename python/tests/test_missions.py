@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import swath
+from swath.missions import AnyPlanner
 
 ROOT = Path(__file__).parents[2]
 
@@ -84,7 +85,7 @@ def test_contexts_tell_what_is_known(short: dict[str, Any]) -> None:
 
 
 def test_evaluations_compare_planners_seed_by_seed(short: dict[str, Any]) -> None:
-    planners = ["heuristic:80", Greedy(80.0), "random", "beam"]
+    planners: list[AnyPlanner] = ["heuristic:80", Greedy(80.0), "random", "beam"]
     scores = swath.evaluate(planners, seeds=range(3, 6), threads=2, **short)
     assert [[score["seed"] for score in own] for own in scores] == [[3, 4, 5]] * 4
     assert scores[0] == scores[1]

@@ -20,8 +20,7 @@ def run(*args: str) -> subprocess.CompletedProcess[str]:
 
 def test_types_are_right() -> None:
     config = str(PYTHON / "pyproject.toml")
-    installed = str(Path(swath.__file__).parent)
-    checked = run("-m", "mypy", "--config-file", config, installed, str(PYTHON / "tests"), str(PYTHON / "examples"))
+    checked = run("-m", "mypy", "--config-file", config, *(str(PYTHON / part) for part in ("swath", "tests", "examples")))
     assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
@@ -63,7 +62,7 @@ def test_the_wheel_installs_into_a_clean_environment(tmp_path: Path) -> None:
     made = subprocess.run([sys.executable, "-m", "venv", tmp_path / "clean"], check=False)
     assert made.returncode == 0
     python = tmp_path / "clean/bin/python"
-    pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel]
+    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel]
     installed = subprocess.run(pip, capture_output=True, text=True, check=False)
     assert installed.returncode == 0, installed.stderr
     code = "import swath; print(swath.fly('random', episode={'orbits': 0.1}).score['seed'])"

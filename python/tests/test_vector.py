@@ -10,13 +10,14 @@ import gymnasium
 import numpy as np
 import pytest
 import swath
-from gymnasium.utils.env_checker import check_returned_data_not_reused
-from gymnasium.utils.env_match import data_equivalence
+from gymnasium.utils.env_checker import check_returned_data_not_reused, data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 MODES = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED]
 #: Episodes that end within a few dozen steps, with slots that empty.
 BRIEF: dict[str, Any] = {"episode": {"orbits": 0.15, "scenario": {"count": [300, 600]}}}
+
+MODEST: dict[str, Any] = {"episode": {"orbits": 1.0, "scenario": {"count": [300, 300]}}}
 
 
 def choose(rng: np.random.Generator, mask: Any) -> tuple[Any, Any]:
@@ -117,7 +118,7 @@ def test_environments_that_are_over_wait_for_their_reset() -> None:
 
 
 def test_memory_stays_what_it_is() -> None:
-    envs = swath.StripImagingVectorEnv(8, threads=2, **BRIEF)
+    envs = swath.StripImagingVectorEnv(8, threads=2, **MODEST)
     _, infos = envs.reset(seed=0)
     rng = np.random.default_rng(1)
 
@@ -128,9 +129,10 @@ def test_memory_stays_what_it_is() -> None:
         gc.collect()
         return resident_kb()
 
-    steps(500)
-    before = steps(500)
-    assert steps(3000) - before < 4_000
+    steps(200)
+    before = steps(200)
+    # A hundred episodes and 8000 observations of 2 kB would show.
+    assert steps(1000) - before < 4_000
 
 
 def resident_kb() -> int:

@@ -28,7 +28,7 @@ const EPISODES: [(u64, ObservationSet, u32, f64); 4] = [
     (7, ObservationSet::Table1, 3000, 0.0),
     (8, ObservationSet::Dynamics, 400, 0.5),
     (u64::MAX, ObservationSet::Table1Momentum, 1500, 0.0),
-    (9, ObservationSet::Table1, 12, 0.0),
+    (0, ObservationSet::Table1, 3, 0.0),
 ];
 
 struct Digest(u64);
