@@ -72,16 +72,23 @@ def test_episodes_are_those_of_rust_bit_by_bit(kept: dict[str, Any]) -> None:
     assert f"{digest.state:016x}" == kept["digest"]
 
 
-def test_steps_tell_what_came_of_them(short: dict[str, Any]) -> None:
-    env = make(**short)
-    env.action_space.seed(1)
+def in_reach(env: swath.StripImagingEnv, parameter: float) -> np.int64:
+    """The first strip whose window is open after a transition."""
+    context = env.context
+    start_s = context.now_s + parameter * context.t_pre_max_s
+    return np.int64(((context.window_open_s <= start_s) & (start_s <= context.window_close_s)).argmax())
+
+
+def test_steps_tell_what_came_of_them() -> None:
+    env = make(episode={"orbits": 1.0, "scenario": {"count": [1500, 1500]}})
     _, info = env.reset(seed=5)
     failures = set()
     for _ in range(40):
         before = info["time_s"]
-        first = int(env.context.strip[0])
-        _, reward, terminated, truncated, info = env.step((np.int64(0), np.array([0.7])))
-        assert info["strip"] == first
+        chosen = in_reach(env, 0.6)
+        identity = int(env.context.strip[chosen])
+        _, reward, terminated, truncated, info = env.step((chosen, np.array([0.6])))
+        assert info["strip"] == identity
         assert info["time_s"] - before == pytest.approx(info["duration_s"])
         assert info["success"] == (info["failure"] == swath.Failure.NONE) == (float(reward) > 0)
         failures.add(swath.Failure(info["failure"]))
@@ -184,8 +191,8 @@ def test_the_picture_shows_strips_and_track(short: dict[str, Any]) -> None:
     env.reset(seed=2)
     first = env.render()
     assert first is not None and first.shape == (360, 720, 3) and first.dtype == np.uint8
-    for _ in range(30):
-        env.step((np.int64(0), np.array([1.0])))
+    for _ in range(10):
+        env.step((in_reach(env, 1.0), np.array([1.0])))
     then = env.render()
     assert then is not None
 
