@@ -2,7 +2,9 @@
 
 use swath_sim::config::RAD_S_PER_RPM;
 use swath_sim::learn::episode::EpisodeConfig;
-use swath_sim::learn::observation::{MOMENTUM_SCALE, ObservationSet, RATE_SCALE, WINDOW_SCALE_S};
+use swath_sim::learn::observation::{
+    DENSITY_SCALE, MOMENTUM_SCALE, ORBIT_SCALE_S, ObservationSet, RATE_SCALE, WINDOW_SCALE_S,
+};
 use swath_sim::mission::{horizon, windows_until};
 use swath_sim::model::Model;
 use swath_sim::vehicle::errors::PlantErrors;
@@ -11,6 +13,8 @@ use swath_sim::vehicle::errors::PlantErrors;
 const ROUNDING: f64 = 1e-5;
 /// What the noise of sensors reaches at most: Box and Muller's numbers from 53 bits end at 8.6 [sigma].
 const NOISE_SIGMAS: f64 = 9.0;
+/// Contacts are looked for this far past twice the present time [s].
+const CONTACTS_AHEAD_S: f64 = 2.0 * 86_400.0;
 
 /// Least and greatest value of each feature of a strip, in the order of [`swath_sim::learn::observation::observe`].
 pub fn of(model: &Model, episode: &EpisodeConfig, plant: &PlantErrors, set: ObservationSet) -> (Vec<f32>, Vec<f32>) {
@@ -32,8 +36,21 @@ pub fn of(model: &Model, episode: &EpisodeConfig, plant: &PlantErrors, set: Obse
         either(window),
     ];
     let extra = [momentum / MOMENTUM_SCALE, 1.0, rate / RATE_SCALE].into_iter().flat_map(|most| [either(most); 3]);
-    let all = table1.into_iter().chain(rest).chain(extra).take(set.features());
+    let all = table1.into_iter().chain(rest).chain(extra).chain(resources(model, time_s)).take(set.features());
     all.map(|(low, high)| ((low - ROUNDING) as f32, (high * (1.0 + ROUNDING) + ROUNDING) as f32)).unzip()
+}
+
+/// Features of power and data, up to a time [s].
+fn resources(model: &Model, time_s: f64) -> [(f64, f64); 16] {
+    let shadow = 2.0 * model.orbit_period_s() / ORBIT_SCALE_S;
+    let contact = (2.0 * time_s + CONTACTS_AHEAD_S) / ORBIT_SCALE_S;
+    let density = model.config.planning.candidates as f64 / DENSITY_SCALE;
+    let (share, either) = ((0.0, 1.0), |most: f64| (-most, most));
+    let relative = [either(shadow), either(shadow), share, share, either(contact), either(contact)];
+    let mut all = [(0.0, density); 16];
+    let own = [share, either(1.0), share].into_iter().chain(relative).chain([either(1.0); 3]);
+    all.iter_mut().zip(own).for_each(|(slot, bound)| *slot = bound);
+    all
 }
 
 /// Most momentum that a wheel can have [N m s]. A wheel at its limit takes no more torque, so it passes it by less than

@@ -9,14 +9,14 @@ use swath_sim::learn::observation::{ObservationSet, observe};
 use swath_sim::model::Model;
 use swath_sim::planner::DecisionContext;
 use swath_sim::requests::catalogue::Candidate;
-use swath_sim::task::TaskRecord;
+use swath_sim::task::{Duty, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::world::frames::{earth_to_inertial, latitude_longitude_deg};
 use swath_sim::world::orbit::Orbit;
 
 use crate::errors::refused;
-use crate::records::task_row;
+use crate::records::{resource_row, task_row};
 
 /// Decides to image a strip.
 #[pyclass(frozen, eq, get_all, module = "swath._swath", skip_from_py_object)]
@@ -65,6 +65,43 @@ impl Wait {
     fn __repr__(&self) -> String {
         format!("Wait(duration_s={:?})", self.duration_s)
     }
+}
+
+/// Decides to see to power, data or momentum, where those have bounds.
+#[pyclass(frozen, eq, get_all, module = "swath._swath", skip_from_py_object)]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Serve {
+    /// `charge`, `downlink` or `desaturate`.
+    duty: String,
+    /// For how long [s], rounded up to whole ticks.
+    duration_s: f64,
+}
+
+#[pymethods]
+impl Serve {
+    #[new]
+    fn new(duty: String, duration_s: f64) -> PyResult<Self> {
+        duty_of(&duty)?;
+        Ok(Self { duty, duration_s })
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Serve(duty='{}', duration_s={:?})", self.duty, self.duration_s)
+    }
+}
+
+impl Serve {
+    /// What is done, and for how long [s].
+    ///
+    /// # Errors
+    /// A word that is no duty.
+    pub fn parts(&self) -> PyResult<(Duty, f64)> {
+        Ok((duty_of(&self.duty)?, self.duration_s))
+    }
+}
+
+fn duty_of(name: &str) -> PyResult<Duty> {
+    toml::Value::String(name.to_owned()).try_into().map_err(|error: toml::de::Error| refused(&error))
 }
 
 impl Wait {
@@ -191,6 +228,12 @@ impl Context {
     #[getter]
     fn wheel_speed_rad_s(&self) -> [f64; 3] {
         self.situation.body.wheel_speed.into()
+    }
+
+    /// How power and data stand; nothing where they have no bounds.
+    #[getter]
+    fn resources<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        self.situation.resources.map(|state| resource_row(py, &state, self.model.period)).transpose()
     }
 
     /// How the task went that ended here; none at the first decision.

@@ -19,7 +19,7 @@ mod strips;
 #[pyo3::pymodule]
 mod _swath {
     #[pymodule_export]
-    use super::context::{Context, Image, Wait};
+    use super::context::{Context, Image, Serve, Wait};
     #[pymodule_export]
     use super::episodes::Episodes;
     #[pymodule_export]

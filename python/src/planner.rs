@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, PlannerSpec};
 
-use crate::context::{Context, Image, Wait};
+use crate::context::{Context, Image, Serve, Wait};
 use crate::errors::refused;
 
 /// A planner that is asked for.
@@ -29,7 +29,8 @@ impl Asked {
             if spec.hand_written(0).is_none() {
                 let text = format!(
                     "`{name}` is a trained policy, which this package does not know: expected lookahead[:TICKS], \
-                     beam[:WIDTHxDEPTH], heuristic:SECONDS, random, or an object that decides"
+                     beam[:WIDTHxDEPTH], repair[:TICKS] or aspen, each also with -annealing or -squeaky, \
+                     heuristic:SECONDS, random, or an object that decides"
                 );
                 return Err(PyValueError::new_err(text));
             }
@@ -137,8 +138,13 @@ fn decision(decided: &Bound<'_, PyAny>, model: &Model) -> PyResult<Decision> {
         check("duration_s", seconds, period.seconds(), WAIT_MAX_S)?;
         return Ok(Decision::Wait { ticks: period.ticks_ceil(seconds) });
     }
+    if let Ok(serve) = decided.cast::<Serve>() {
+        let (duty, seconds) = serve.get().parts()?;
+        check("duration_s", seconds, period.seconds(), WAIT_MAX_S)?;
+        return Ok(Decision::Serve { duty, ticks: period.ticks_ceil(seconds) });
+    }
     let kind = decided.get_type().name()?;
-    Err(PyTypeError::new_err(format!("the planner decided a {kind}, neither swath.Image nor swath.Wait")))
+    Err(PyTypeError::new_err(format!("the planner decided a {kind}, not swath.Image, swath.Wait or swath.Serve")))
 }
 
 fn check(name: &str, value: f64, least: f64, most: f64) -> PyResult<()> {

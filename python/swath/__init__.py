@@ -16,7 +16,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from swath import _registration
-from swath._swath import Context, Image, Settings, Wait
+from swath._swath import Context, Image, Serve, Settings, Wait
 
 if TYPE_CHECKING:
     from swath.environment import Failure, StripImagingEnv
@@ -35,6 +35,7 @@ __all__ = [
     "Image",
     "Planner",
     "Score",
+    "Serve",
     "Settings",
     "Strip",
     "StripImagingEnv",

@@ -7,13 +7,14 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from swath.missions import Score, Task
+from swath.missions import Resources, Score, Task
 from swath.strips import Strip
 
 __all__ = [
     "Context",
     "Episodes",
     "Image",
+    "Serve",
     "Settings",
     "Wait",
     "evaluate",
@@ -156,6 +157,10 @@ class Context:
         """Speed of each wheel [rad/s]."""
 
     @property
+    def resources(self) -> Resources | None:
+        """How power and data stand; nothing where they have no bounds."""
+
+    @property
     def previous(self) -> dict[str, Any] | None:
         """How the task went that ended here; none at the first decision."""
 
@@ -193,11 +198,31 @@ class Wait:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
+@final
+class Serve:
+    """Decides to see to power, data or momentum, where those have bounds, for ``duration_s`` seconds.
+
+    Raises:
+        ValueError: A ``duty`` other than ``charge``, ``downlink`` and ``desaturate``.
+    """
+
+    def __new__(cls, duty: str, duration_s: float) -> Serve: ...
+    @property
+    def duty(self) -> str:
+        """``charge``, ``downlink`` or ``desaturate``."""
+
+    @property
+    def duration_s(self) -> float:
+        """For how long [s], rounded up to whole ticks."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
 def fly(planner: Any, settings: Settings, seed: int) -> tuple[Score, list[Task]]:
     """Flies the mission of a seed to its end: its score, and a row for each task."""
 
 def evaluate(
-    planners: Sequence[str | Any | Callable[[Context], Image | Wait]],
+    planners: Sequence[str | Any | Callable[[Context], Image | Wait | Serve]],
     settings: Settings,
     seeds: Sequence[int],
     threads: int,
@@ -205,7 +230,7 @@ def evaluate(
     """Flies the mission of every seed with every planner: scores by planner, then by seed."""
 
 def read_strips(path: str | os.PathLike[str], settings: Settings) -> list[Strip]:
-    """Reads strips from a GeoJSON file."""
+    """Reads strips from a file."""
 
 def feature_collection(strips: Iterable[Strip], settings: Settings) -> str:
     """Strips as a GeoJSON text."""

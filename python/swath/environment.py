@@ -61,18 +61,20 @@ class StripImagingEnv(gymnasium.Env[Observation, Action]):
     **Reward** the strip's priority when it was imaged, else 0, paid at the end of the step. Steps have different lengths:
     ``info["duration_s"]`` is what a discount per second needs.
 
-    **End** ``truncated`` when the episode's length is reached (bootstrap), ``terminated`` when no strip is left.
+    **End** ``truncated`` when the episode's length is reached (bootstrap), ``terminated`` when no strip is left,
+    or when the satellite failed.
 
     **Seeds** ``reset(seed=s)`` begins the very episode that ``swath-train`` flies for ``s``; ``reset()`` draws the next
     seed from ``np_random``.
 
     Args:
         config: A TOML file with the keys below, or a run file of ``swath-train``.
-        observation: ``table1``, ``table1-momentum`` or ``dynamics``.
+        observation: ``table1``, ``table1-momentum``, ``dynamics`` or ``resources``.
         episode: ``orbits``, ``scenario`` (``count``, ``length_km``, ``speed_m_s``, ``priority``), ``arrivals``.
-        simulation: ``orbit``, ``earth``, ``spacecraft``, ``control``, ``imaging``, ``planning``, ``requests``.
+        simulation: ``orbit``, ``earth``, ``spacecraft``, ``control``, ``imaging``, ``planning``, ``requests``,
+            ``resources``.
         plant: How the satellite differs from its model: a table, or a name such as ``torque-10%,noise``.
-        strips: Strips of one's own instead of random ones: a list, or a GeoJSON file.
+        strips: Strips of one's own instead of random ones: a list, or a file that :func:`swath.read_strips` reads.
         render_mode: ``rgb_array`` draws a map with the strips and the ground track.
 
     Raises:

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypedDict
 
 from swath import _swath
 from swath._settings import Strips, checked_seed, settings_of
-from swath._swath import Context, Image, Settings, Wait
+from swath._swath import Context, Image, Serve, Settings, Wait
 
 #: What 15 orbits with 2000 to 5000 strips are called where planners are compared.
 EVALUATION: Mapping[str, Any] = {"orbits": 15.0, "scenario": {"count": [2000, 5000]}}
@@ -18,11 +18,11 @@ EVALUATION: Mapping[str, Any] = {"orbits": 15.0, "scenario": {"count": [2000, 50
 class Planner(Protocol):
     """A planner of one's own: an object with this method, or a function that does the same."""
 
-    def decide(self, context: Context, /) -> Image | Wait:
+    def decide(self, context: Context, /) -> Image | Wait | Serve:
         """Decides what to do next."""
 
 
-AnyPlanner = str | Planner | Callable[[Context], Image | Wait]
+AnyPlanner = str | Planner | Callable[[Context], Image | Wait | Serve]
 
 
 class Score(TypedDict):
@@ -54,6 +54,31 @@ class Score(TypedDict):
     failed_attitude: float | None
     #: Share of the attempts that failed for elevation.
     failed_elevation: float | None
+
+
+class Resources(TypedDict):
+    """How power and data stand."""
+
+    #: Charge of the battery [Wh].
+    charge_wh: float
+    #: Capacity of the battery [Wh].
+    capacity_wh: float
+    #: Share of the Sun's disc that is seen.
+    illumination: float
+    #: Power of the array [W].
+    generated_w: float
+    #: Power of all loads [W].
+    load_w: float
+    #: Bits stored.
+    stored_bits: int
+    #: Bits that wait to be sent.
+    to_send_bits: int
+    #: Bits that there is room for in all.
+    storage_bits: int
+    #: Whether a station hears the satellite.
+    in_contact: bool
+    #: Begin and end of the contact that is under way or comes next, simulated time [s].
+    contact_s: tuple[float, float] | None
 
 
 class Task(TypedDict):
@@ -104,8 +129,9 @@ def fly(
     """Flies the mission of a seed to its end.
 
     Args:
-        planner: ``beam``, ``lookahead``, ``heuristic:SECONDS``, ``random``, or a planner of one's own, which gets a
-            :class:`swath.Context` and returns a :class:`swath.Image` or a :class:`swath.Wait`.
+        planner: ``beam``, ``lookahead``, ``repair``, ``aspen``, ``heuristic:SECONDS``, ``random``, or a planner of one's
+            own, which gets a :class:`swath.Context` and returns a :class:`swath.Image`, a :class:`swath.Wait` or, where
+            resources have bounds, a :class:`swath.Serve`.
         seed: Seed of the mission: initial state and random strips.
 
     The other arguments are those of :class:`swath.StripImagingEnv`.

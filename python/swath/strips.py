@@ -1,4 +1,4 @@
-"""Strips, from and to GeoJSON."""
+"""Strips, from files of many formats, and to GeoJSON."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ class Strip(TypedDict):
 
 
 def read_strips(path: str | os.PathLike[str], settings: Settings | None = None) -> list[Strip]:
-    """Reads strips from a GeoJSON file.
+    """Reads strips from a file: GeoJSON, lines or a text sequence of it, KML, GPX, WKT or CSV; ``-`` is standard input.
 
-    Each LineString, or each line of a MultiLineString, is a strip; one that is longer than the longest strip becomes
-    several. Properties: ``priority``, ``acquisition_speed_m_s``, ``bidirectional``.
+    A line becomes the fewest strips that follow it, a polygon parallel strips that cover it. Properties: ``priority``,
+    ``acquisition_speed_m_s``, ``bidirectional``. Conditions of an order that episodes do not know, such as
+    ``valid_until``, are left out with a ``UserWarning``.
 
     Raises:
-        ValueError: The file cannot be read, is no GeoJSON, or holds something that is no strip.
+        ValueError: The file cannot be read, or holds something that is no strip; all of it is named.
     """
     return _swath.read_strips(os.fspath(path), settings or Settings())
 

@@ -24,7 +24,7 @@ def make(**settings: Any) -> swath.StripImagingEnv:
     return env
 
 
-@pytest.mark.parametrize("observation", ["table1", "table1-momentum", "dynamics"])
+@pytest.mark.parametrize("observation", ["table1", "table1-momentum", "dynamics", "resources"])
 def test_gymnasium_finds_nothing_to_say(observation: str, short: dict[str, Any]) -> None:
     env = make(observation=observation, render_mode="rgb_array", **short)
     with warnings.catch_warnings():
@@ -51,7 +51,8 @@ class Digest:
 def test_episodes_are_those_of_rust_bit_by_bit(kept: dict[str, Any]) -> None:
     scenario = {"count": [kept["strips"]] * 2}
     episode = {"orbits": kept["orbits"], "arrivals": kept["arrivals"], "scenario": scenario}
-    env = make(observation=kept["observation"], episode=episode)
+    simulation = {} if kept["resources"] is None else {"resources": kept["resources"]}
+    env = make(observation=kept["observation"], episode=episode, simulation=simulation)
     digest = Digest()
 
     def see(observation: Any, info: dict[str, Any]) -> int:
@@ -76,7 +77,9 @@ def in_reach(env: swath.StripImagingEnv, parameter: float) -> np.int64:
     """The first strip whose window is open after a transition."""
     context = env.context
     start_s = context.now_s + parameter * context.t_pre_max_s
-    return np.int64(((context.window_open_s <= start_s) & (start_s <= context.window_close_s)).argmax())
+    open_then = (context.window_open_s <= start_s) & (start_s <= context.window_close_s)
+    chosen: np.int64 = np.int64(open_then.argmax())
+    return chosen
 
 
 def test_steps_tell_what_came_of_them() -> None:
@@ -173,8 +176,14 @@ def test_plants_that_differ_fly_differently(short: dict[str, Any]) -> None:
 
 
 def test_observations_stay_inside_their_space() -> None:
-    for plant in ["none", "torque+10%,inertia-10%,noise"]:
-        env = make(episode={"orbits": 1.0, "scenario": {"count": [800, 800]}}, observation="dynamics", plant=plant)
+    episode = {"orbits": 1.0, "scenario": {"count": [800, 800]}}
+    for plant, simulation in [
+        ("none", {}),
+        ("torque+10%,inertia-10%,noise", {}),
+        ("noise", {"resources": {"reward": "delivered"}}),
+        ("none", {"resources": {"profile": "bsk"}}),
+    ]:
+        env = make(episode=episode, observation="resources", plant=plant, simulation=simulation)
         env.action_space.seed(8)
         observation, info = env.reset(seed=8)
         over = False

@@ -53,7 +53,7 @@ def test_functions_plan_too_and_what_they_raise_is_passed_on(short: dict[str, An
         (swath.Image(40, 10.0), ValueError, "candidate 40 was chosen of 40"),
         (swath.Image(0, 121.0), ValueError, "t_pre_s is 121, outside 0 to 120"),
         (swath.Wait(float("nan")), ValueError, "duration_s is NaN, outside 0.5 to 86400"),
-        (None, TypeError, "decided a NoneType, neither swath.Image nor swath.Wait"),
+        (None, TypeError, "decided a NoneType, not swath.Image, swath.Wait or swath.Serve"),
     ]:
         with pytest.raises(kind, match=text):
             swath.fly(lambda context, decided=decided: decided, **short)  # type: ignore[misc]
@@ -84,6 +84,31 @@ def test_contexts_tell_what_is_known(short: dict[str, Any]) -> None:
     assert abs(track[:, 0]).max() <= 45.1 and np.ptp(track[:, 0]) < 4.0
 
 
+def test_planners_by_repair_fly_too(short: dict[str, Any]) -> None:
+    for name in ["repair", "aspen"]:
+        assert swath.fly(name, seed=2, **short).score["attempts_per_orbit"] > 10
+
+
+def test_planners_of_ones_own_charge_and_see_how_power_stands() -> None:
+    brief: dict[str, Any] = {"episode": {"orbits": 1.0, "scenario": {"count": [300, 300]}}}
+    levels: list[float] = []
+
+    def charges(context: swath.Context) -> swath.Serve:
+        stands = context.resources
+        assert stands is not None and stands["capacity_wh"] == 120.0 and stands["stored_bits"] == 0
+        levels.append(stands["charge_wh"])
+        return swath.Serve("charge", 60.0)
+
+    poor = {"resources": {"profile": "bsk", "battery_initial": 0.2, "shield": False}}
+    swath.fly(charges, simulation=poor, **brief)
+    assert max(levels) > levels[0] == pytest.approx(24.0)
+    assert swath.Serve("downlink", 2.0) == swath.Serve("downlink", 2.0) != swath.Serve("charge", 2.0)
+    with pytest.raises(ValueError, match="unknown variant `sleep`"):
+        swath.Serve("sleep", 1.0)
+    with pytest.raises(ValueError, match="Charge was chosen, but the mission has no"):
+        swath.fly(lambda context: swath.Serve("charge", 60.0), **brief)
+
+
 def test_evaluations_compare_planners_seed_by_seed(short: dict[str, Any]) -> None:
     planners: list[AnyPlanner] = ["heuristic:80", Greedy(80.0), "random", "beam"]
     scores = swath.evaluate(planners, seeds=range(3, 6), threads=2, **short)
@@ -112,6 +137,23 @@ def test_strips_survive_geojson(tmp_path: Path) -> None:
         swath.write_strips(tmp_path / "no.geojson", [strips[0], {**strips[1], "priority": 2.0}])
     with pytest.raises(ValueError, match="cannot read requests"):
         swath.read_strips(tmp_path / "nowhere.geojson")
+
+
+def test_strips_of_every_format_are_read_and_all_faults_are_told(tmp_path: Path) -> None:
+    (tmp_path / "strips.csv").write_text("name,wkt\nPo,\"LINESTRING (8.1 45.1, 9.5 45.1)\"\n")
+    (one,) = swath.read_strips(tmp_path / "strips.csv")
+    assert (one["start_longitude_deg"], one["end_longitude_deg"], one["priority"]) == (8.1, 9.5, 0.5)
+    shapes = ['{"type": "Point", "coordinates": [1, 2]}', '{"type": "LineString", "coordinates": [[0, 0], [0.001, 0]]}']
+    features = [f'{{"type": "Feature", "properties": {{}}, "geometry": {shape}}}' for shape in shapes]
+    (tmp_path / "no.geojson").write_text('{"type": "FeatureCollection", "features": [' + ",".join(features) + "]}")
+    with pytest.raises(ValueError, match="(?s)feature 1: a Point is no strip.*no-2: length 0.11"):
+        swath.read_strips(tmp_path / "no.geojson")
+    (tmp_path / "held.geojson").write_text(
+        '{"type": "Feature", "properties": {"hold_for_approval": true},'
+        ' "geometry": {"type": "LineString", "coordinates": [[0, 0], [1, 0]]}}'
+    )
+    with pytest.warns(UserWarning, match="1 strips have conditions"):
+        assert len(swath.read_strips(tmp_path / "held.geojson")) == 1
 
 
 def test_strips_of_ones_own_are_flown(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use swath_sim::config::SimConfig;
+use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
@@ -33,6 +34,7 @@ fn main() -> Result<()> {
         "{}",
         serde_json::json!({
             "closed_loop_ticks_per_s": closed_loop(&model)?,
+            "closed_loop_resources_ticks_per_s": closed_loop(&with_resources()?)?,
             "decision_steps_per_s": decision_steps(&model)?,
             "windows_5000x24h_s": windows(&model, &day),
             "window_one_strip_ms": one_window(&model, &day[0]),
@@ -41,6 +43,12 @@ fn main() -> Result<()> {
         })
     );
     Ok(())
+}
+
+/// The same satellite with power, data and momentum, all modules on.
+fn with_resources() -> Result<Arc<Model>> {
+    let resources = Some(Box::new(ResourcesConfig::of(Profile::Minisat)));
+    Ok(Arc::new(Model::new(SimConfig { resources, ..SimConfig::default() })?))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -7,6 +7,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::SimError;
 use crate::time::TickPeriod;
 
+pub(crate) mod range;
+pub mod resources;
+pub mod station;
+
+pub(crate) use range::{in_range, ordered};
+use resources::ResourcesConfig;
+
 /// Everything that a mission's physics and planning problem depend on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -25,6 +32,9 @@ pub struct SimConfig {
     pub planning: PlanningConfig,
     /// What a request may ask for.
     pub requests: RequestLimits,
+    /// Power, data and momentum; without, they are boundless, as in the paper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resources: Option<Box<ResourcesConfig>>,
 }
 
 /// Circular two-body orbit; node and phase belong to the mission's initial state.
@@ -252,7 +262,8 @@ impl SimConfig {
         }
         possible_body(s.inertia_kg_m2)?;
         ordered("requests.length_km", self.requests.length_min_km, self.requests.length_max_km)?;
-        ordered("requests.speed_m_s", self.requests.speed_min_m_s, self.requests.speed_max_m_s)
+        ordered("requests.speed_m_s", self.requests.speed_min_m_s, self.requests.speed_max_m_s)?;
+        self.resources.as_ref().map_or(Ok(()), |resources| resources.validate())
     }
 }
 
@@ -268,16 +279,6 @@ fn possible_body([x, y, z]: [f64; 3]) -> Result<(), SimError> {
         }
     }
     Ok(())
-}
-
-/// Refuses a value outside [min, max], and NaN.
-pub(crate) fn in_range(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), SimError> {
-    if (min..=max).contains(&value) { Ok(()) } else { Err(SimError::OutOfRange { name, value, min, max }) }
-}
-
-/// Refuses a range that runs backwards.
-pub(crate) fn ordered(name: &'static str, min: f64, max: f64) -> Result<(), SimError> {
-    if min <= max { Ok(()) } else { Err(SimError::EmptyRange { name, min, max }) }
 }
 
 #[cfg(test)]

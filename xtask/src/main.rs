@@ -1,5 +1,6 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|wheel|soak`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|wheel|soak|ament`.
 
+mod ament;
 mod bench;
 mod examples;
 mod libtorch;
@@ -11,6 +12,7 @@ mod venv;
 mod wheel;
 
 use std::ffi::OsString;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -35,6 +37,8 @@ usage: cargo xtask COMMAND
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
+  ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
+                   in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
   soak python      run the Python package's long examples; they fetch gigabytes
 ";
 
@@ -62,6 +66,7 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("bench") => bench(&root, rest),
         Some("wheel") => wheel(&root, rest),
         Some("soak") => soak(&root, rest),
+        Some("ament") => ament(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
             Ok(())
@@ -155,6 +160,20 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
     }
     setup(root, true)?;
     soak::run(root, args)
+}
+
+fn ament(root: &Path, args: &[OsString]) -> Result<()> {
+    let prefix = match args {
+        [] => root.join("target/ament"),
+        [folder] => std::path::absolute(folder).with_context(|| format!("there is no {}", folder.display()))?,
+        _ => bail!("ament takes one folder\n\n{USAGE}"),
+    };
+    setup(root, false)?;
+    let packages = ["--package", "swath-nodes", "--package", "swath-bags", "--bins"];
+    process::run(process::cargo(root, "build").arg("--release").args(packages))?;
+    ament::lay_out(root, &root.join("target/release"), &prefix)?;
+    let line = format!("export AMENT_PREFIX_PATH={}:$AMENT_PREFIX_PATH", prefix.display());
+    writeln!(std::io::stdout(), "{line}").context("cannot say where ROS finds the programs")
 }
 
 fn repository_root() -> Result<PathBuf> {

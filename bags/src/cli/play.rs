@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     error::{Result, chain},
+    out::say,
     play::{End, LAST_MESSAGES, PlayOptions, Player},
     reader::TopicPattern,
 };
@@ -87,6 +88,9 @@ pub struct PlayArgs {
     /// Leave the terminal's keys alone
     #[arg(long)]
     disable_keyboard_controls: bool,
+    /// Play into a mission that flies in this domain
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     read: ReadArgs,
 }
@@ -108,7 +112,7 @@ impl PlayArgs {
             "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3,
         }))?;
         if summary.refused > 0 {
-            eprintln!("{} messages could not be published", summary.refused);
+            say(&format!("{} messages could not be published", summary.refused));
         }
         let code = done(&summary.faults);
         Ok(if summary.refused == 0 { code } else { ExitCode::from(WITH_LOSS) })
@@ -131,6 +135,7 @@ impl PlayArgs {
             remap: self.remap.into_iter().collect(),
             qos_overrides: overrides(self.qos_profile_overrides_path.as_deref())?,
             keys: !self.disable_keyboard_controls,
+            force: self.force,
             acknowledged: match self.wait_for_all_acked {
                 None => Some(LAST_MESSAGES),
                 Some(0) => None,

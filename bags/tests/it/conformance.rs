@@ -15,36 +15,13 @@ use swath_bags::{
 };
 
 use crate::common::{
-    conformance::{Content, File, files},
-    contents::{Found, found},
+    conformance::{File, files},
+    contents::{defined, found},
 };
 
 /// Chunks that the `mcap` crate reads without its features.
 fn plain() -> BagOptions {
     BagOptions { compression: Compression::None, ..BagOptions::default() }
-}
-
-/// What a file is defined to hold, as the `mcap` crate reads it.
-fn defined(content: &Content) -> Found {
-    let schema =
-        content.schema.as_ref().map(|(header, data)| (header.name.clone(), header.encoding.clone(), data.clone()));
-    let channel = content.channel.as_ref().map(|channel| {
-        let schema = schema.clone().filter(|_| channel.schema_id > 0);
-        (channel.topic.clone(), channel.message_encoding.clone(), channel.metadata.clone(), schema)
-    });
-    let message = |(header, data): &(mcap::records::MessageHeader, Vec<u8>)| {
-        ("example".to_owned(), header.log_time, header.publish_time, header.sequence, data.clone())
-    };
-    let mut messages: Vec<_> = content.messages.iter().map(message).collect();
-    messages.sort_by_key(|message| message.1);
-    let attachment = content.attachment.as_ref().map(|(header, data)| (header.clone(), data.clone()));
-    Found {
-        profile: String::new(),
-        channels: channel.into_iter().collect(),
-        messages,
-        attachments: attachment.into_iter().collect(),
-        metadata: content.metadata.iter().cloned().map(|m| (m.name, m.metadata)).collect(),
-    }
 }
 
 #[test]

@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use crate::file::{Mission, MissionError};
 use crate::orders::action::Action;
-use crate::outcome::TaskLine;
+use crate::outcome::{ResourcesSummary, TaskLine};
 use crate::requests::logic::RequestLogic;
 use crate::requests::refusal::Refusal;
 
@@ -52,6 +52,9 @@ impl RequestKeeper for Desk {
     fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
         self.requests.set_situation(*situation);
         *candidates = self.requests.on_decision_point(task, situation.now, &[]).candidates;
+        for contradiction in self.requests.take_contradictions() {
+            tracing::error!("{contradiction}");
+        }
         // Nobody keeps a journal here.
         self.requests.take_journal();
     }
@@ -86,11 +89,12 @@ impl InProcessMission {
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
-        let initial = mission.initial_requests()?;
+        let (initial, faults) = mission.initial_requests()?;
+        faults.iter().for_each(|fault| tracing::warn!("{fault}"));
         let requested = initial.len();
-        for named in initial {
+        for order in initial {
             // Why one is refused is in the request manager's counts.
-            _ = requests.submit(named);
+            _ = requests.submit(order, Tick(0));
         }
         let mut desk = Desk { requests, to_come: actions.into(), refused: Vec::new() };
         desk.take_while(|action| action.initial);
@@ -125,6 +129,17 @@ impl InProcessMission {
         (self.requested, self.requests().len())
     }
 
+    /// What came to the ground so far and how power and data stand, in a mission with resources.
+    #[must_use]
+    pub fn resources(&self) -> Option<ResourcesSummary> {
+        let onboard = self.mission.onboard()?;
+        Some(ResourcesSummary {
+            delivered: *self.mission.delivered(),
+            battery_level: onboard.battery().level(),
+            stored_bits: onboard.storage().stored(),
+        })
+    }
+
     /// Decides and flies to the end, handing each task and its line to `each`.
     ///
     /// # Errors
@@ -151,7 +166,7 @@ impl InProcessMission {
     ) -> Result<Option<(SettledTask, TaskLine)>, InProcessError> {
         let Some(settled) = self.mission.fly_one(planner, until)? else { return Ok(None) };
         let request = settled.record.strip.and_then(|id| self.requests().request(id));
-        let line = TaskLine::new(&settled, request.map(|request| request.named.name.as_str()));
+        let line = TaskLine::new(&settled, request.map(|request| request.order.name.as_str()));
         Ok(Some((settled, line)))
     }
 }

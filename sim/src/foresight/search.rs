@@ -10,7 +10,7 @@ use crate::planner::{Allowance, Search};
 use crate::requests::catalogue::Candidate;
 use crate::vehicle::flight::Situation;
 use crate::vehicle::mrp;
-use crate::world::frames::{earth_to_inertial, reference_dcm};
+use crate::world::frames::reference_dcm;
 use crate::world::orbit::Orbit;
 use crate::world::strip::StripId;
 use crate::world::turn::Turn;
@@ -218,9 +218,8 @@ impl<'a> Ground<'a> {
         let spacecraft = &self.model.config.spacecraft;
         let start = from.now.after(self.model.period.ticks_ceil(30.0)).max(candidate.window.open);
         let turn = self.earth.cos_sin(start);
-        let (target_E, scan_E) = candidate.strip.target_E(0.0);
-        let target_N = earth_to_inertial(turn, &target_E) * self.model.config.earth.radius_m;
-        let dcm_RN = reference_dcm(&self.orbit.position(start), &target_N, &earth_to_inertial(turn, &scan_E));
+        let (target_N, scan_N) = candidate.strip.target_N(0.0, turn, self.model.config.earth.radius_m);
+        let dcm_RN = reference_dcm(&self.orbit.position(start), &target_N, &scan_N);
         let angle = mrp::principal_angle(&mrp::subtract(&from.body.sigma_BN, &mrp::from_dcm(&dcm_RN)));
         // ‖σ‖ = tan(θ/4).
         let allowed = 4.0 * libm::atan(self.model.config.imaging.sigma_max);

@@ -223,14 +223,15 @@ impl Episode {
         Ok(())
     }
 
-    /// Flies an action to its end, and on to where there is a strip to choose. An episode that has none left is over.
+    /// Flies an action to its end, and on to where there is a strip to choose. An episode that has none left is over, and
+    /// so is one whose satellite failed: an empty battery, a wheel that turns too fast.
     ///
     /// # Errors
     /// A token without a strip; before [`Episode::begin`].
     pub fn step(&mut self, action: Action) -> Result<Outcome, LearnError> {
         let decision = decision(&self.model, action);
         let step = self.env.as_mut().ok_or(LearnError::NoEpisode)?.step(decision)?;
-        let (waited, found) = self.wait_for_candidates()?;
+        let (waited, found) = if step.terminated { (0, false) } else { self.wait_for_candidates()? };
         let taught_s = self.teacher.as_mut().map_or(0.0, |teacher| std::mem::take(&mut teacher.waited_s));
         let period = self.model.period;
         Ok(Outcome {
@@ -256,11 +257,11 @@ impl Episode {
         let env = self.env.as_mut().ok_or(LearnError::NoEpisode)?;
         loop {
             match teacher.planner.decide(&env.context())? {
-                Decision::Wait { .. } if teacher.waited_s > LONGEST_LESSON_WAIT_S => {
+                Decision::Wait { .. } | Decision::Serve { .. } if teacher.waited_s > LONGEST_LESSON_WAIT_S => {
                     return Err(LearnError::Idle { name: teacher.planner.name() });
                 }
-                Decision::Wait { ticks } => {
-                    env.step(Decision::Wait { ticks })?;
+                decision @ (Decision::Wait { ticks } | Decision::Serve { ticks, .. }) => {
+                    env.step(decision)?;
                     teacher.waited_s += self.model.period.duration_s(ticks);
                 }
                 Decision::Image { candidate, t_pre } => {
@@ -341,7 +342,7 @@ mod tests {
             let step = env.step(decision).unwrap();
             match decision {
                 Decision::Image { .. } => flown.push((step.reward, step.record.success())),
-                Decision::Wait { .. } => waits += 1,
+                Decision::Wait { .. } | Decision::Serve { .. } => waits += 1,
             }
         }
         assert!(waits > 0 && flown.len() > 10, "{waits} {}", flown.len());

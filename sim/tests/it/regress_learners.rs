@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::EpisodeConfig;
 use swath_sim::learn::hybrid::{Action, Episode, Progress};
@@ -17,6 +18,7 @@ struct Flown {
     observation: ObservationSet,
     strips: u32,
     arrivals: f64,
+    resources: Option<Value>,
     orbits: f64,
     steps: usize,
     reward: f64,
@@ -24,11 +26,13 @@ struct Flown {
     digest: String,
 }
 
-const EPISODES: [(u64, ObservationSet, u32, f64); 4] = [
-    (7, ObservationSet::Table1, 3000, 0.0),
-    (8, ObservationSet::Dynamics, 400, 0.5),
-    (u64::MAX, ObservationSet::Table1Momentum, 1500, 0.0),
-    (0, ObservationSet::Table1, 3, 0.0),
+/// Seed, observation, strips, arrivals, and whether there is a battery, which is nearly empty.
+const EPISODES: [(u64, ObservationSet, u32, f64, bool); 5] = [
+    (7, ObservationSet::Table1, 3000, 0.0, false),
+    (8, ObservationSet::Dynamics, 400, 0.5, false),
+    (u64::MAX, ObservationSet::Table1Momentum, 1500, 0.0, false),
+    (0, ObservationSet::Table1, 3, 0.0, false),
+    (9, ObservationSet::Resources, 2000, 0.0, true),
 ];
 
 struct Digest(u64);
@@ -53,11 +57,14 @@ impl Digest {
     }
 }
 
-fn fly((seed, observation, strips, arrivals): (u64, ObservationSet, u32, f64)) -> Flown {
+fn fly((seed, observation, strips, arrivals, battery): (u64, ObservationSet, u32, f64, bool)) -> Flown {
+    let resources = battery.then(|| json!({ "profile": "minisat", "battery_initial": 0.05 }));
+    let bounded = resources.clone().map(|it| serde_json::from_value(it).unwrap());
+    let model = Model::new(SimConfig { resources: bounded, ..SimConfig::default() }).unwrap();
     let mut config = EpisodeConfig { orbits: 0.7, arrivals, ..EpisodeConfig::default() };
     config.scenario.count = [strips; 2];
     let orbits = config.orbits;
-    let mut episode = Episode::new(Arc::new(Model::new(SimConfig::default()).unwrap()), config, observation);
+    let mut episode = Episode::new(Arc::new(model), config, observation);
     episode.begin(seed).unwrap();
     let (mut digest, mut steps, mut reward) = (Digest(0xcbf2_9ce4_8422_2325), 0, 0.0);
     let mut offered = digest.seen(&episode);
@@ -72,7 +79,7 @@ fn fly((seed, observation, strips, arrivals): (u64, ObservationSet, u32, f64)) -
         if outcome.progress != Progress::Continues {
             let ended = format!("{:?}", outcome.progress).to_lowercase();
             let digest = format!("{:016x}", digest.0);
-            return Flown { seed, observation, strips, arrivals, orbits, steps, reward, ended, digest };
+            return Flown { seed, observation, strips, arrivals, resources, orbits, steps, reward, ended, digest };
         }
     }
 }

@@ -10,6 +10,8 @@ use mcap::{
 };
 use swath_bags::RECORDING;
 
+use super::conformance::Content;
+
 type Pairs = BTreeMap<String, String>;
 /// Name, encoding and bytes.
 pub type Schema = (String, String, Vec<u8>);
@@ -61,4 +63,27 @@ pub fn found(bytes: &[u8]) -> Found {
     found.channels.sort();
     found.messages.sort_by_key(|message| message.1);
     found
+}
+
+/// What a file is defined to hold, as the `mcap` crate reads it.
+pub fn defined(content: &Content) -> Found {
+    let schema =
+        content.schema.as_ref().map(|(header, data)| (header.name.clone(), header.encoding.clone(), data.clone()));
+    let channel = content.channel.as_ref().map(|channel| {
+        let schema = schema.clone().filter(|_| channel.schema_id > 0);
+        (channel.topic.clone(), channel.message_encoding.clone(), channel.metadata.clone(), schema)
+    });
+    let message = |(header, data): &(mcap::records::MessageHeader, Vec<u8>)| {
+        ("example".to_owned(), header.log_time, header.publish_time, header.sequence, data.clone())
+    };
+    let mut messages: Vec<_> = content.messages.iter().map(message).collect();
+    messages.sort_by_key(|message| message.1);
+    let attachment = content.attachment.as_ref().map(|(header, data)| (header.clone(), data.clone()));
+    Found {
+        profile: String::new(),
+        channels: channel.into_iter().collect(),
+        messages,
+        attachments: attachment.into_iter().collect(),
+        metadata: content.metadata.iter().cloned().map(|m| (m.name, m.metadata)).collect(),
+    }
 }

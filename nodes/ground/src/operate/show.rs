@@ -2,72 +2,27 @@
 
 use anyhow::Result;
 use serde_json::{Value, json};
-use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
+use swath_node::out;
 
-use swath_mission::requests::lifecycle::State;
-use swath_mission::time_text;
-use swath_node::stamp::nanoseconds;
-
-/// Name of a state.
-pub fn state_name(number: u8) -> &'static str {
-    State::from_number(number).map_or("unknown", State::name)
-}
-
-/// A time, or a dash without one.
-pub fn time(time: &Time) -> String {
-    if *time == Time::default() { "-".to_owned() } else { time_text::format(nanoseconds(time)) }
-}
-
-fn time_json(at: &Time) -> Value {
-    if *at == Time::default() { Value::Null } else { time(at).into() }
-}
+use super::files::printable;
+use crate::requests::json::{history_json, state_name, status_json, time, time_json};
 
 /// Prints what became of a request or of what was asked of it.
-#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
 pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
-    if as_json {
+    out::print_line(if as_json {
         let line = json!({
             "name": name, "accepted": result.accepted, "id": result.id,
             "reason_code": result.reason_code, "reason": result.reason,
         });
-        println!("{}", serde_json::to_string(&line)?);
+        line.to_string()
     } else if result.accepted {
-        println!("{done:<9} {:>7}  {name}", result.id);
+        format!("{done:<9} {:>7}  {}", result.id, printable(name))
     } else {
-        println!("refused   {:>7}  {name}: {} (reason {})", "-", result.reason, result.reason_code);
-    }
+        let (name, reason) = (printable(name), printable(&result.reason));
+        format!("refused   {:>7}  {name}: {reason} (reason {})", "-", result.reason_code)
+    })?;
     Ok(())
-}
-
-/// Where a request stands, for machines.
-pub fn status_json(status: &msg::StripStatus) -> Value {
-    let strip = &status.strip;
-    json!({
-        "id": strip.id,
-        "name": strip.name,
-        "client_ref": status.client_ref,
-        "submitter": status.submitter,
-        "start": [strip.start_longitude_deg, strip.start_latitude_deg],
-        "end": [strip.end_longitude_deg, strip.end_latitude_deg],
-        "priority": strip.priority,
-        "acquisition_speed_m_s": strip.acquisition_speed,
-        "state": state_name(status.state),
-        "reason_code": status.reason_code,
-        "reason": status.reason,
-        "actor": status.actor,
-        "changed": time_json(&status.header.stamp),
-        "tick": status.tick,
-        "created_tick": status.created_tick,
-        "attempts": status.attempts,
-        "reward": status.reward,
-        "window_open": time_json(&status.window_open),
-        "window_close": time_json(&status.window_close),
-        "imaging": time_json(&status.imaging),
-        "linked_to": status.linked_to,
-        "supersedes": status.supersedes,
-        "superseded_by": status.superseded_by,
-    })
 }
 
 /// Head of a table of requests.
@@ -80,9 +35,8 @@ pub fn status_head() -> String {
 
 /// A request as a line of a table.
 pub fn status_line(status: &msg::StripStatus) -> String {
-    let reason = if status.reason.is_empty() { String::new() } else { format!(": {}", status.reason) };
     format!(
-        "{:>7}  {:<19} {:>4.2} {:>3}  {:<20}  {:<20}  {:<20}  {}{reason}",
+        "{:>7}  {:<19} {:>4.2} {:>3}  {:<20}  {:<20}  {:<20}  {}{}",
         status.strip.id,
         state_name(status.state),
         status.strip.priority,
@@ -90,8 +44,14 @@ pub fn status_line(status: &msg::StripStatus) -> String {
         time(&status.window_open),
         time(&status.window_close),
         time(&status.imaging),
-        status.strip.name,
+        printable(&status.strip.name),
+        because(&status.reason),
     )
+}
+
+/// A reason behind what it is the reason for.
+fn because(reason: &str) -> String {
+    if reason.is_empty() { String::new() } else { format!(": {}", printable(reason)) }
 }
 
 /// A chance, for machines.
@@ -128,22 +88,6 @@ pub fn opportunity_table(opportunities: &[msg::Opportunity]) -> String {
         )
     });
     std::iter::once(head).chain(lines).collect()
-}
-
-/// A line of the audit trail, for machines.
-pub fn history_json(entry: &msg::HistoryEntry) -> Value {
-    json!({
-        "sequence": entry.sequence,
-        "strip": entry.strip_id,
-        "client_ref": entry.client_ref,
-        "name": entry.name,
-        "time": time_json(&entry.stamp),
-        "tick": entry.tick,
-        "state": state_name(entry.state),
-        "reason_code": entry.reason_code,
-        "reason": entry.reason,
-        "actor": entry.actor,
-    })
 }
 
 fn attempt_state(state: u8) -> &'static str {
@@ -193,18 +137,18 @@ pub fn report_text(report: &msg::StripReport) -> String {
     let mut text = format!(
         "strip {} {}\n  {} since {}{}\n  from {:.4}° {:.4}° to {:.4}° {:.4}°, priority {}, {} m/s, by {} ({})\n",
         strip.id,
-        strip.name,
+        printable(&strip.name),
         state_name(status.state),
         time(&status.header.stamp),
-        if status.reason.is_empty() { String::new() } else { format!(": {}", status.reason) },
+        because(&status.reason),
         strip.start_latitude_deg,
         strip.start_longitude_deg,
         strip.end_latitude_deg,
         strip.end_longitude_deg,
         strip.priority,
         strip.acquisition_speed,
-        status.submitter,
-        status.client_ref,
+        printable(&status.submitter),
+        printable(&status.client_ref),
     );
     for (what, id) in
         [("linked to", status.linked_to), ("replaces", status.supersedes), ("replaced by", status.superseded_by)]
@@ -235,9 +179,35 @@ pub fn report_text(report: &msg::StripReport) -> String {
             time(&entry.stamp),
             entry.strip_id,
             state_name(entry.state),
-            entry.actor,
-            if entry.reason.is_empty() { String::new() } else { format!(": {}", entry.reason) },
+            printable(&entry.actor),
+            because(&entry.reason),
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operate::planner::status_text;
+
+    #[test]
+    fn what_others_wrote_does_not_steer_the_terminal() {
+        let evil = || "\x1b[2J\u{9b}1m".to_owned();
+        let strip = msg::Strip { name: evil(), ..Default::default() };
+        let status = msg::StripStatus {
+            reason: evil(),
+            submitter: evil(),
+            client_ref: evil(),
+            strip: strip.clone(),
+            ..Default::default()
+        };
+        let entry = msg::HistoryEntry { actor: evil(), reason: evil(), ..Default::default() };
+        let report = msg::StripReport { status: status.clone(), history: vec![entry], ..Default::default() };
+        let proposal = msg::PlannerStatus { proposal: 1, strip, ..Default::default() };
+        for text in [status_line(&status), report_text(&report), status_text(&proposal)] {
+            assert!(text.contains("\\u{1b}[2J"), "{text:?}");
+            assert!(!text.chars().any(|letter| letter.is_control() && letter != '\n'), "{text:?}");
+        }
+    }
 }

@@ -1,4 +1,9 @@
-//! Orders: what is asked for, and the files that it comes in.
+//! What is asked for: orders, the files that they come in, and what else operators ask.
 
 pub mod action;
+pub mod cutting;
+pub mod feature;
+pub mod formats;
 pub mod geojson;
+pub mod import;
+pub mod order;

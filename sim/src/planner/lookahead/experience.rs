@@ -1,6 +1,6 @@
 //! What a planner learns of the satellite from how its own tasks went.
 
-use super::super::{Decision, DecisionContext};
+use super::super::decision::{Decision, DecisionContext};
 use crate::task::FailureReason;
 use crate::time::Tick;
 use crate::world::strip::StripId;
@@ -93,7 +93,7 @@ impl Experience {
     pub fn remember(&mut self, context: &DecisionContext<'_>, decision: Decision) {
         let (strip, t_pre) = match decision {
             Decision::Image { candidate, t_pre } => (context.candidates.get(candidate).map(|it| it.id), t_pre),
-            Decision::Wait { .. } => (None, 0),
+            Decision::Wait { .. } | Decision::Serve { .. } => (None, 0),
         };
         self.decided = Some(Decided { task: context.task, now: context.situation.now, strip, t_pre });
     }
