@@ -18,6 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-ros", &["swath-msgs"]),
     ("swath-bags", &["swath-msgs", "swath-ros"]),
     ("swath-training", &["swath-sim"]),
+    ("swath-python", &["swath-sim", "swath-mission"]),
     ("swath-mission", &["swath-sim", "swath-msgs"]),
     ("swath-node", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission"]),
     ("swath-space", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-node"]),
@@ -46,6 +47,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-ros", &["tch", "torch-sys", "mcap"]),
     ("swath-bags", &["tch", "torch-sys"]),
     ("swath-training", &["ros2-client", "rustdds", "mcap"]),
+    ("swath-python", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
     ("swath-mission", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
     ("swath-node", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
@@ -103,6 +105,15 @@ fn no_files_import_each_other_in_a_circle() {
         }
     }
     assert!(circles.is_empty(), "files import each other in circles:\n{}", circles.join("\n"));
+}
+
+#[test]
+fn every_import_names_one_module() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let members = sources().into_iter().filter_map(|source| source.parent().map(Path::to_owned));
+    let folders = members.flat_map(|it| ["src", "tests", "examples", "benches", "build"].map(|name| it.join(name)));
+    let nested: Vec<_> = folders.chain([root.join("examples")]).flat_map(|it| imports::nested(&it)).collect();
+    assert!(nested.is_empty(), "write one `use` a module:\n{}", nested.join("\n"));
 }
 
 #[test]

@@ -56,11 +56,6 @@ impl Flight {
         Ok(self.launch.try_wait()?.is_none())
     }
 
-    /// Process of the launcher.
-    pub fn launcher(&self) -> u32 {
-        self.launch.id()
-    }
-
     /// `tasks.jsonl` as far as it is written.
     pub fn tasks(&self) -> String {
         std::fs::read_to_string(self.out.join("tasks.jsonl")).unwrap_or_default()

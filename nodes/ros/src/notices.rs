@@ -34,6 +34,7 @@ pub enum Trouble {
 
 impl Trouble {
     /// Name for alarms.
+    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unreadable => "unreadable messages",

@@ -43,8 +43,10 @@ pub fn fly(
     if record {
         let bag = output.path().join("bag");
         let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
-        let words: Vec<String> = words.map(str::to_owned).into_iter().chain(manifest_data(mission, &namespace, policies)).collect();
-        let words: Vec<String> = words.into_iter().chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
+        let words: Vec<String> =
+            words.map(str::to_owned).into_iter().chain(manifest_data(mission, &namespace, policies)).collect();
+        let words: Vec<String> =
+            words.into_iter().chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words, true)?;
         fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
     }

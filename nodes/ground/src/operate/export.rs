@@ -116,14 +116,8 @@ fn from_mission(ros: &RosArgs) -> Result<Everything> {
 }
 
 fn from_store(store: &Store) -> Result<Everything> {
-    let snapshot = store.snapshot()?;
+    let requests = stored(store)?;
     let stamper = store.stamper()?;
-    let stored = (1..).map(StripId).zip(snapshot.requests);
-    let requests = stored.map(|(id, stored)| {
-        let status = stored_status(&stamper, snapshot.progress.now, id, &stored);
-        (stored.request.order, status)
-    });
-    let requests = requests.collect();
     let mut trail: Vec<msg::HistoryEntry> = Vec::new();
     loop {
         let lines = store.trail(trail.last().map_or(0, |entry| entry.sequence), PAGE as usize)?;
@@ -132,4 +126,19 @@ fn from_store(store: &Store) -> Result<Everything> {
         }
         trail.extend(lines.iter().map(|line| history_entry(&stamper, line)));
     }
+}
+
+/// The orders of a store, and where they stand.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(super) fn stored(store: &Store) -> Result<Vec<(Order, msg::StripStatus)>> {
+    let snapshot = store.snapshot()?;
+    let stamper = store.stamper()?;
+    let stored = (1..).map(StripId).zip(snapshot.requests);
+    let requests = stored.map(|(id, stored)| {
+        let status = stored_status(&stamper, snapshot.progress.now, id, &stored);
+        (stored.request.order, status)
+    });
+    Ok(requests.collect())
 }

@@ -4,6 +4,7 @@ mod client;
 mod cover;
 mod export;
 mod files;
+mod orders;
 mod planner;
 mod query;
 mod selection;
@@ -44,11 +45,15 @@ enum StripsCommand {
     /// List strips by state, area and time.
     #[command(after_help = "Example: swath strips list --state accepted --area 35,70,-10,40")]
     List(query::ListArgs),
+    /// List orders, each a line or an area with its strips, and how much of each is imaged.
+    #[command(after_help = "Examples:\n  swath strips orders --submitter floods\n  \
+        swath strips orders --store out/one/requests.sqlite")]
+    Orders(orders::OrdersArgs),
     /// Show all that is known of a strip: chances, attempts, history.
     Show(query::ShowArgs),
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
-    /// Replace a strip by the one of a file.
+    /// Replace a strip, or a whole order, by the line or area of a file.
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),
@@ -76,6 +81,7 @@ pub fn run_strips(args: &StripsArgs, ros: &RosArgs) -> Result<()> {
         StripsCommand::Cover(args) => cover::cover(args),
         StripsCommand::Preview(args) => query::preview(args, ros),
         StripsCommand::List(args) => query::list(args, ros),
+        StripsCommand::Orders(args) => orders::orders(args, ros),
         StripsCommand::Show(args) => query::show(args, ros),
         StripsCommand::Cancel(args) => submit::cancel(args, ros),
         StripsCommand::Replace(args) => submit::replace(args, ros),

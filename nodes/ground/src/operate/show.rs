@@ -154,9 +154,17 @@ pub fn report_text(report: &msg::StripReport) -> String {
         printable(&status.submitter),
         printable(&status.client_ref),
     );
-    for (what, id) in
-        [("linked to", status.linked_to), ("replaces", status.supersedes), ("replaced by", status.superseded_by)]
-    {
+    if status.parts > 0 {
+        let share = 100.0 * status.share;
+        text +=
+            &format!("  part {} of {} of order {}, {share:.1} % of it\n", status.part, status.parts, status.order_id);
+    }
+    for (what, id) in [
+        ("linked to", status.linked_to),
+        ("replaces", status.supersedes),
+        ("replaced by", status.superseded_by),
+        ("served by the imaging of", status.served_by),
+    ] {
         if id != 0 {
             text += &format!("  {what} strip {id}\n");
         }

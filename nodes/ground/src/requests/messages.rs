@@ -66,7 +66,8 @@ pub fn filter(stamper: &Stamper, call: &msg::ListStripsRequest) -> Result<Filter
             if call.opportunity_until == none { Tick(u64::MAX) } else { stamper.tick_from(&call.opportunity_until) };
         Some((stamper.tick_from(&call.opportunity_from), until))
     };
-    Ok(Filter { states, area, between })
+    let order = (call.order_id != 0).then_some(StripId(call.order_id));
+    Ok(Filter { order, states, area, between })
 }
 
 fn area(call: &msg::ListStripsRequest) -> Result<Area, Refusal> {
@@ -118,7 +119,9 @@ pub fn upcoming_strips<'a>(
 pub fn strip_status(stamper: &Stamper, logic: &RequestLogic, id: StripId, request: &Request) -> msg::StripStatus {
     let listed = logic.strip(id);
     let windows = listed.map_or(&[][..], |listed| listed.windows_after(logic.now()));
-    status(stamper, id, request, windows.first(), listed.and_then(|listed| listed.linked))
+    let linked = listed.and_then(|listed| listed.linked);
+    let served_by = number(logic.served_by(id));
+    msg::StripStatus { served_by, ..status(stamper, id, request, windows.first(), linked) }
 }
 
 /// Where a request of a store stands.
@@ -137,6 +140,7 @@ fn status(
 ) -> msg::StripStatus {
     let window = window.filter(|_| !request.state.is_final());
     let standing = &request.standing;
+    let part = request.order.part.as_ref();
     msg::StripStatus {
         header: stamper.header(request.changed, EARTH_FRAME),
         strip: strip(id.0, &request.order),
@@ -156,6 +160,12 @@ fn status(
         linked_to: number(linked),
         supersedes: number(request.supersedes),
         superseded_by: number(standing.superseded_by),
+        order_id: request.order_id.0,
+        order_ref: part.map_or_else(String::new, |part| part.order_ref.clone()),
+        part: part.map_or(0, |part| part.number),
+        parts: part.map_or(0, |part| part.of),
+        share: part.map_or(1.0, |part| part.share),
+        served_by: 0,
     }
 }
 
@@ -195,14 +205,20 @@ fn number(id: Option<StripId>) -> u64 {
     id.map_or(0, |id| id.0)
 }
 
-/// What became of a request or of what was asked of it.
+/// What became of a request or of what was asked of it; `known` before it was asked.
 #[must_use]
-pub fn submit_result(result: Result<StripId, Refusal>) -> msg::SubmitResult {
+pub fn submit_result(logic: &RequestLogic, known: bool, result: Result<StripId, Refusal>) -> msg::SubmitResult {
     match result {
-        Ok(id) => msg::SubmitResult { accepted: true, id: id.0, ..msg::SubmitResult::default() },
-        Err(refusal) => {
-            msg::SubmitResult { accepted: false, id: 0, reason_code: refusal.code(), reason: refusal.to_string() }
+        Ok(id) => {
+            let state = logic.state(id).map_or(0, State::number);
+            msg::SubmitResult { accepted: true, id: id.0, known, state, ..msg::SubmitResult::default() }
         }
+        Err(refusal) => msg::SubmitResult {
+            reason_code: refusal.code(),
+            reason: refusal.to_string(),
+            state: State::Rejected.number(),
+            ..msg::SubmitResult::default()
+        },
     }
 }
 
