@@ -76,8 +76,7 @@ pub fn message_description(catalogue: &Catalogue, message: &Message) -> Result<S
         let members: Vec<String> = message.fields.iter().map(member).collect();
         description_of_members(&message.type_name(), &members)
     };
-    let referenced: Vec<String> =
-        dependencies(catalogue, message)?.iter().map(|name| full(&catalogue[name])).collect();
+    let referenced: Vec<String> = dependencies(catalogue, message)?.iter().map(|name| full(&catalogue[name])).collect();
     Ok(whole(&full(message), &referenced.iter().map(String::as_str).collect::<Vec<_>>()))
 }
 
@@ -142,10 +141,7 @@ fn hash(description: &str, referenced: &BTreeMap<String, String>) -> String {
 }
 
 fn whole(description: &str, referenced: &[&str]) -> String {
-    format!(
-        r#"{{"type_description": {description}, "referenced_type_descriptions": [{}]}}"#,
-        referenced.join(", ")
-    )
+    format!(r#"{{"type_description": {description}, "referenced_type_descriptions": [{}]}}"#, referenced.join(", "))
 }
 
 fn description(type_name: &str, fields: &[Field]) -> String {

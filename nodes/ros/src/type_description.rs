@@ -34,11 +34,7 @@ fn described(request: &GetTypeDescriptionRequest) -> Result<GetTypeDescriptionRe
 fn source(type_name: &str) -> Option<TypeSource> {
     // A bag's text goes on with those of the types that it is made of.
     let text = Interface::find(type_name)?.schema.split(RULE).next()?;
-    Some(TypeSource {
-        type_name: type_name.to_owned(),
-        encoding: "msg".to_owned(),
-        raw_file_contents: text.to_owned(),
-    })
+    Some(TypeSource { type_name: type_name.to_owned(), encoding: "msg".to_owned(), raw_file_contents: text.to_owned() })
 }
 
 #[cfg(test)]
@@ -73,7 +69,10 @@ mod tests {
 
     #[test]
     fn other_types_and_hashes_are_refused() {
-        assert_eq!(ask("std_msgs/msg/Nothing", "").failure_reason, "std_msgs/msg/Nothing is no message that this node knows");
+        assert_eq!(
+            ask("std_msgs/msg/Nothing", "").failure_reason,
+            "std_msgs/msg/Nothing is no message that this node knows"
+        );
         let told = ask("std_msgs/msg/Header", "RIHS01_0");
         assert!(!told.successful && told.failure_reason.ends_with(", not RIHS01_0"), "{}", told.failure_reason);
     }
