@@ -40,7 +40,7 @@ pub enum LaneError {
         lane: usize,
         /// Why.
         #[source]
-        source: Box<LaneError>,
+        source: Box<Self>,
     },
 }
 

@@ -3,7 +3,9 @@
 use swath_ros::{RawSample, RawSubscription, graph};
 
 use super::stamp::StampPlace;
-use crate::{error::Result, schema::Schema, topic::Topic};
+use crate::error::Result;
+use crate::schema::Schema;
+use crate::topic::Topic;
 
 /// Messages that are taken from one topic before the others have their turn.
 const TURN: usize = 8192;
@@ -36,6 +38,7 @@ pub(super) struct Source {
 impl Source {
     pub(super) fn new(
         topic: Topic,
+        is_clock: bool,
         subscription: RawSubscription,
         entry: Option<&'static graph::Entry>,
     ) -> Result<Self> {
@@ -43,7 +46,6 @@ impl Source {
             true => StampPlace::Nowhere,
             false => StampPlace::of(&Schema::of(&topic)?),
         };
-        let is_clock = topic.name == "/clock" && topic.type_name == "rosgraph_msgs/msg/Clock";
         Ok(Self { topic, is_clock, subscription, stamp, entry, lost: 0 })
     }
 

@@ -25,6 +25,9 @@ use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
+use swath_ros::RosArgs;
+
+use crate::place::Place;
 
 /// `swath launch`.
 #[derive(Debug, Args)]
@@ -60,6 +63,9 @@ pub struct LaunchArgs {
     /// Print the summary as JSON instead of a table.
     #[arg(long)]
     pub json: bool,
+    /// Where it flies.
+    #[command(flatten)]
+    pub place: Place,
 }
 
 impl LaunchArgs {
@@ -97,7 +103,7 @@ const NOT_AS_ASKED: u8 = 3;
 /// # Errors
 /// When the mission is not valid, a node fails or never comes up, or an output cannot be written. What was flown until
 /// then is in the outputs; where nothing was, there are none.
-pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
+pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
     if mission.sim.resources.is_some() && !args.in_process {
         bail!("a mission with [resources] flies in one process only: add --in-process");
@@ -108,7 +114,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
     let (requests, faults) = mission.initial_requests()?;
     faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
-    let flown = fly(args, &mission, &requests, &mut output, policies);
+    let flown = fly(args, &args.place.args(ros), &mission, &requests, &mut output, policies);
     let Flown { summary, failure } = match flown {
         Ok(flown) => flown,
         Err(error) => {
@@ -137,6 +143,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
 /// Flies a mission; an error where nothing was flown.
 fn fly(
     args: &LaunchArgs,
+    ros: &RosArgs,
     mission: &Mission,
     requests: &[Order],
     output: &mut OutputFolder,
@@ -148,7 +155,7 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
-        over_dds::fly(&mission, &mission_file, output, !args.no_bag, policies)
+        over_dds::fly(&mission, &mission_file, ros, output, !args.no_bag, policies)
     }
 }
 

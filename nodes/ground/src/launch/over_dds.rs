@@ -32,20 +32,25 @@ const WAIT: Duration = Duration::from_millis(100);
 pub fn fly(
     mission: &Mission,
     mission_file: &Path,
+    ros: &RosArgs,
     output: &mut OutputFolder,
     record: bool,
     policies: &Policies,
 ) -> Result<Flown> {
-    let mut launcher = Launcher::start(mission)?;
+    let mut launcher = Launcher::start(mission, ros)?;
+    let namespace = launcher.node.names().namespace().to_owned();
     let mut fleet = Fleet::default();
     if record {
         let bag = output.path().join("bag");
         let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
-        let words: Vec<String> = words.map(str::to_owned).into_iter().chain(manifest_data(mission, policies)).collect();
+        let words: Vec<String> =
+            words.map(str::to_owned).into_iter().chain(manifest_data(mission, &namespace, policies)).collect();
+        let words: Vec<String> =
+            words.into_iter().chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words, true)?;
         fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
     }
-    start_nodes(&mut fleet, mission_file, output, record)?;
+    start_nodes(&mut fleet, mission_file, &namespace, output, record)?;
     let nodes = fleet.processes();
     let watched = launcher.watch(&mut fleet, output);
     let Some(flown) = launcher.flown else {
@@ -83,8 +88,8 @@ pub fn fly(
 }
 
 /// What the manifest of the bag tells besides the mission.
-fn manifest_data(mission: &Mission, policies: &Policies) -> Vec<String> {
-    let mut entries = vec![format!("revision={}", policies.revision)];
+fn manifest_data(mission: &Mission, namespace: &str, policies: &Policies) -> Vec<String> {
+    let mut entries = vec![format!("revision={}", policies.revision), format!("namespace={namespace}")];
     match (policies.digest)(&mission.planner) {
         Ok(Some(digest)) => entries.push(format!("policy_hash={digest}")),
         Ok(None) => {}
@@ -94,11 +99,17 @@ fn manifest_data(mission: &Mission, policies: &Policies) -> Vec<String> {
     entries.into_iter().flat_map(|entry| ["--manifest-data".to_owned(), entry]).collect()
 }
 
-fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, record: bool) -> Result<()> {
+fn start_nodes(
+    fleet: &mut Fleet,
+    mission_file: &Path,
+    namespace: &str,
+    output: &OutputFolder,
+    record: bool,
+) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
     let words = |extra: &[String]| {
         let own = ["--ros-args", "-p", &mission].map(str::to_owned);
-        own.into_iter().chain(extra.iter().cloned()).collect::<Vec<_>>()
+        own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
     fleet.start_and_keep(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
@@ -111,6 +122,11 @@ fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, re
     }
     let wait_for = ["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
     fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for), false)
+}
+
+/// The words after `--ros-args` that put a node into a namespace.
+fn in_namespace(namespace: &str) -> [String; 2] {
+    ["-r".to_owned(), format!("__ns:={namespace}")]
 }
 
 fn text(path: &Path) -> Result<String> {
@@ -153,8 +169,8 @@ struct Reached {
 }
 
 impl Launcher {
-    fn start(mission: &Mission) -> Result<Self> {
-        let node = Node::start(graph::LAUNCHER, &RosArgs::default())?;
+    fn start(mission: &Mission, ros: &RosArgs) -> Result<Self> {
+        let node = Node::start(graph::LAUNCHER, ros)?;
         let model = mission.model()?;
         Ok(Self {
             shutdown: Shutdown::on_signals(node.signal())?,
@@ -196,6 +212,10 @@ impl Launcher {
                 bail!("interrupted");
             }
             while let Some(point) = self.points.take()? {
+                if point.tick > self.horizon.0 {
+                    tracing::warn!("a decision point of tick {} lies after the mission's end", point.tick);
+                    continue;
+                }
                 last_news = Instant::now();
                 let (end, began) = (Tick(point.tick), self.flown.map_or(last_news, |flown| flown.began));
                 self.flown = Some(Reached { end, began, last: last_news });
@@ -225,6 +245,9 @@ impl Launcher {
     }
 
     fn take_rest(&mut self, output: &mut OutputFolder) -> Result<()> {
+        for notice in self.node.notices() {
+            tracing::warn!("{}: {notice}", notice.trouble.name());
+        }
         while let Some(result) = self.results.take()? {
             self.log.settled(result.task, result.reward);
         }
