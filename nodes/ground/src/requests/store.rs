@@ -67,7 +67,6 @@ const MIGRATIONS: [&str; 3] =
     [include_str!("schema_1.sql"), include_str!("schema_2.sql"), include_str!("schema_3.sql")];
 /// How long a connection waits for another one's lock.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
-
 /// Pages that are copied in one step.
 const PAGES_AT_ONCE: i32 = 4096;
 
