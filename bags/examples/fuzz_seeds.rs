@@ -3,9 +3,9 @@
 //! Their checksums are zero, which means unchecked, so that changed bytes reach the parsers.
 #![allow(clippy::unwrap_used, reason = "an example that cannot go on should panic")]
 
-#[path = "../tests/common/conformance.rs"]
+#[path = "../tests/it/common/conformance.rs"]
 mod conformance;
-#[path = "../tests/common/mutate.rs"]
+#[path = "../tests/it/common/mutate.rs"]
 mod mutate;
 
 use std::{env, fs, path::Path};

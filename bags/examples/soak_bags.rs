@@ -4,9 +4,9 @@
 //! hundredth is recovered and filtered, too. A bag that takes longer than [`PATIENCE`] ends the run.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
 
-#[path = "../tests/common/conformance.rs"]
+#[path = "../tests/it/common/conformance.rs"]
 mod conformance;
-#[path = "../tests/common/mutate.rs"]
+#[path = "../tests/it/common/mutate.rs"]
 mod mutate;
 
 use std::{

@@ -6,6 +6,7 @@
 pub mod cli;
 mod error;
 mod file;
+mod losses;
 pub mod metadata;
 pub mod ops;
 pub mod play;
@@ -20,8 +21,10 @@ mod topic;
 mod writer;
 
 pub use error::{BagError, Result, chain};
+pub use file::attachment::Attachment;
 pub use file::chunk::Compression;
 pub use file::source::ReadOptions;
-pub use reader::{Attachment, Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
+pub use losses::{Losses, RECORDING};
+pub use reader::{Bag, BagFile, BagTopic, Filter, Message, Messages, TopicPattern};
 pub use topic::{Definition, Topic};
-pub use writer::{BagOptions, BagSummary, BagWriter, Counter, Losses, RECORDING, TopicId};
+pub use writer::{BagOptions, BagSummary, BagWriter, Counter, TopicId};

@@ -6,7 +6,7 @@ use mcap::records::Channel;
 
 use crate::{
     error::{BagError, Result},
-    file::index::Schema,
+    file::parts::Schema,
     qos::{self, QosProfile, QosTexts},
 };
 

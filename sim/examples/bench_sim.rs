@@ -17,6 +17,7 @@ use swath_sim::rng;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::resources::config::{Profile, ResourcesConfig};
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripRequest;
@@ -33,6 +34,7 @@ fn main() -> Result<()> {
         "{}",
         serde_json::json!({
             "closed_loop_ticks_per_s": closed_loop(&model)?,
+            "closed_loop_resources_ticks_per_s": closed_loop(&with_resources()?)?,
             "decision_steps_per_s": decision_steps(&model)?,
             "windows_5000x24h_s": windows(&model, &day),
             "window_one_strip_ms": one_window(&model, &day[0]),
@@ -41,6 +43,12 @@ fn main() -> Result<()> {
         })
     );
     Ok(())
+}
+
+/// The same satellite with power, data and momentum, all modules on.
+fn with_resources() -> Result<Arc<Model>> {
+    let resources = Some(Box::new(ResourcesConfig::of(Profile::Minisat)));
+    Ok(Arc::new(Model::new(SimConfig { resources, ..SimConfig::default() })?))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

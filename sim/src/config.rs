@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
 use crate::time::TickPeriod;
+use crate::vehicle::resources::config::ResourcesConfig;
 
 /// Everything that a mission's physics and planning problem depend on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,6 +26,9 @@ pub struct SimConfig {
     pub planning: PlanningConfig,
     /// What a request may ask for.
     pub requests: RequestLimits,
+    /// Power, data and momentum; without, they are boundless, as in the paper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resources: Option<Box<ResourcesConfig>>,
 }
 
 /// Circular two-body orbit; node and phase belong to the mission's initial state.
@@ -252,7 +256,8 @@ impl SimConfig {
         }
         possible_body(s.inertia_kg_m2)?;
         ordered("requests.length_km", self.requests.length_min_km, self.requests.length_max_km)?;
-        ordered("requests.speed_m_s", self.requests.speed_min_m_s, self.requests.speed_max_m_s)
+        ordered("requests.speed_m_s", self.requests.speed_min_m_s, self.requests.speed_max_m_s)?;
+        self.resources.as_ref().map_or(Ok(()), |resources| resources.validate())
     }
 }
 

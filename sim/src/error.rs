@@ -56,12 +56,23 @@ pub enum SimError {
         /// The name given.
         name: String,
     },
+    /// A name that is no station's.
+    #[error("no station `{name}` in the catalogue, which has {known}")]
+    UnknownStation {
+        /// The name given.
+        name: String,
+        /// Names that there are.
+        known: String,
+    },
+    /// A transmitter without anybody who listens.
+    #[error("resources.transmitter_rate_bps is not 0, but there are no stations to send to")]
+    DownlinkWithoutStations,
     /// A strip that cannot be flown.
     #[error(transparent)]
     Strip(#[from] StripError),
 }
 
-/// Why a strip is refused. Each reason has a stable number that ROS callers get.
+/// Why a strip is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum StripError {
     /// A number that is NaN or infinite.
@@ -123,21 +134,4 @@ pub enum StripError {
         /// How far ahead windows were sought [s].
         horizon_s: f64,
     },
-}
-
-impl StripError {
-    /// Stable number of the reason: the REASON constants of `swath_msgs/msg/StripStatus`.
-    #[must_use]
-    pub fn code(&self) -> u16 {
-        match self {
-            Self::NotFinite { .. } => 100,
-            Self::Latitude { .. } => 101,
-            Self::Longitude { .. } => 102,
-            Self::Priority { .. } => 103,
-            Self::Speed { .. } => 104,
-            Self::Length { .. } => 105,
-            Self::Antipodal => 111,
-            Self::NoWindow { .. } => 110,
-        }
-    }
 }

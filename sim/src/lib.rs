@@ -5,6 +5,30 @@
 //! radians unless a name says otherwise; configuration and requests are in degrees and kilometres. Equations and tables
 //! are those of Cheval & Schaub, "Reinforcement Learning with Hybrid Action Representation for Autonomous Strip Imaging
 //! Task Scheduling in High-Resolution Super-Agile Satellites".
+//!
+//! A satellite, its requests and a planner make a mission ([`mission::Mission`]), which decides, flies and settles one
+//! task after the other:
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use swath_sim::config::SimConfig;
+//! use swath_sim::learn::episode::{Env, EpisodeConfig};
+//! use swath_sim::model::Model;
+//! use swath_sim::planner::PlannerSpec;
+//! use swath_sim::task::Totals;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let model = Arc::new(Model::new(SimConfig::default())?);
+//! let config = EpisodeConfig { orbits: 0.5, ..EpisodeConfig::evaluation() };
+//! let spec: PlannerSpec = "lookahead".parse()?;
+//! let mut planner = spec.hand_written(7).ok_or("a policy is made by the trainer's crate")?;
+//! let mut totals = Totals::default();
+//! Env::episode(model, &config, 7).run(planner.as_mut(), |settled| totals.add(settled))?;
+//! assert!(totals.reward > 10.0 && totals.success_rate() == 1.0);
+//! # Ok(())
+//! # }
+//! ```
 #![expect(non_snake_case, reason = "frame letters")]
 
 pub mod config;

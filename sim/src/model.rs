@@ -5,6 +5,7 @@ use crate::error::SimError;
 use crate::time::TickPeriod;
 use crate::vehicle::control::ControlLaw;
 use crate::vehicle::dynamics::Plant;
+use crate::world::stations::Station;
 use crate::world::turn::{Turn, earth_turn};
 
 /// A validated configuration with what follows from it.
@@ -20,6 +21,8 @@ pub struct Model {
     pub law: ControlLaw,
     /// The Earth's rotation angle.
     pub earth: Turn,
+    /// Stations that the satellite sends to.
+    pub stations: Vec<Station>,
 }
 
 impl Model {
@@ -34,6 +37,7 @@ impl Model {
             plant: Plant::new(&config.spacecraft, period.seconds()),
             law: ControlLaw::new(&config.control),
             earth: earth_turn(&config, period),
+            stations: config.resources.as_ref().map_or(Ok(Vec::new()), |resources| resources.all_stations())?,
             period,
             config,
         })

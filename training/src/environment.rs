@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 
-pub use crate::learn::{Action, ObservationShape, Outcome, Progress};
+pub use swath_sim::learn::hybrid::{Action, ObservationShape, Outcome, Progress};
 
 /// A semi-Markov decision process with a hybrid action; a pure function of its seed and actions.
 pub trait Environment: Send {

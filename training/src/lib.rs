@@ -48,7 +48,6 @@ pub mod evaluate;
 pub mod figures;
 pub mod gae;
 pub mod ground;
-pub mod learn;
 pub mod lock;
 pub mod lookahead;
 pub mod network;

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
+use swath_sim::learn::hybrid::Episode;
 use swath_sim::model::Model;
 use swath_sim::planner::PlannerSpec;
 
 use crate::config::StripsConfig;
 use crate::environment::{Action, Environment, ObservationShape, Outcome};
 use crate::error::{Result, TrainingError};
-use crate::learn::Episode;
 use crate::planners;
 
-pub use crate::learn::decision;
+pub use swath_sim::learn::hybrid::decision;
 
 /// Strip imaging, one task a step.
 pub struct Strips {

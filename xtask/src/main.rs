@@ -85,10 +85,10 @@ fn setup(root: &Path, tests: bool) -> Result<()> {
 }
 
 /// Runs every test in the release profile: what is tested is what is flown, and one build serves both commands. Programs
-/// come first: tests run those of other packages too, which cargo does not build for them.
+/// and examples come first: tests run those of other packages too, which cargo does not build for them.
 fn test(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, true)?;
-    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins"]))?;
+    process::run(process::cargo(root, "build").args(["--release", "--workspace", "--bins", "--examples"]))?;
     let mut cargo = process::cargo(root, "test");
     cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));

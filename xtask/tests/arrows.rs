@@ -74,7 +74,7 @@ const ROOMS: &[(&str, &[&str])] = &[
 ];
 
 /// Crates that still have circles.
-const UNTANGLED_NEXT: &[&str] = &["bags/src", "nodes/ros/src", "nodes/ground/src", "nodes/mission/src"];
+const UNTANGLED_NEXT: &[&str] = &["nodes/ros/src"];
 
 /// The source folders of all crates.
 fn sources() -> Vec<PathBuf> {

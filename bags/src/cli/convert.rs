@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 
-use super::{ReadArgs, bags, done, print};
+use super::common::{ReadArgs, bags, done, print};
 use crate::{
     error::Result,
     ops::{convert::convert, reindex::reindex},

@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 
-use super::{ReadArgs, WITH_LOSS, done, print, print_json};
+use super::common::{ReadArgs, WITH_LOSS, done, print, print_json};
 use crate::{
     error::{BagError, Result},
     file::chunk::Compression,

@@ -4,7 +4,10 @@ use std::{io, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 
-use super::{ReadArgs, copy::Selection, done, print, print_json};
+use super::{
+    common::{ReadArgs, done, print, print_json},
+    copy::Selection,
+};
 use crate::{
     error::Result,
     ops::{

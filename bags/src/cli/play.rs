@@ -6,7 +6,11 @@ use clap::Args;
 use serde_json::json;
 use swath_ros::RosArgs;
 
-use super::{ReadArgs, WITH_LOSS, bags, copy::seconds, done, overrides, print_json, signals::shutdown_on_signals};
+use super::{
+    common::{ReadArgs, WITH_LOSS, bags, done, overrides, print_json},
+    copy::seconds,
+    signals::shutdown_on_signals,
+};
 use crate::{
     error::{Result, chain},
     play::{End, LAST_MESSAGES, PlayOptions, Player},

@@ -13,7 +13,11 @@ use clap::Args;
 use serde_json::{Value, json};
 use swath_ros::RosArgs;
 
-use super::{WITH_LOSS, copy::Shape, overrides, print_json, signals::shutdown_on_signals};
+use super::{
+    common::{WITH_LOSS, overrides, print_json},
+    copy::Shape,
+    signals::shutdown_on_signals,
+};
 use crate::{
     error::{BagError, Result},
     file::chunk::Compression,

@@ -2,117 +2,26 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::Path,
     sync::Arc,
 };
 
 use mcap::{
     MAGIC,
-    records::{AttachmentHeader, Channel, ChunkHeader, Metadata, Record, op},
+    records::{Channel, ChunkHeader, Metadata, Record, op},
 };
 
 use super::{
+    parts::{AttachmentRef, ChunkRef, Kind, Schema},
     record::{self, Records, misplaced},
     source::Source,
-    sqlite::{Rows, Sqlite},
+    storage::Storage,
     unpack::Unpacker,
     walk::{Place, Walk},
 };
-use crate::error::{BagError, Result};
+use crate::error::Result;
 
 /// Messages of a run of loose records (outside chunks) that are read at a time [bytes].
 const LOOSE_BYTES: u64 = 1 << 20;
-
-/// Where the bytes of a file come from.
-#[derive(Debug, Clone)]
-pub(crate) enum Storage {
-    /// An MCAP file.
-    Mcap(Arc<Source>),
-    /// A SQLite file of rosbag2.
-    Sqlite(Arc<Sqlite>),
-}
-
-impl Storage {
-    pub(crate) fn path(&self) -> &Path {
-        match self {
-            Self::Mcap(source) => &source.path,
-            Self::Sqlite(sqlite) => sqlite.path(),
-        }
-    }
-
-    /// Length of the file [bytes].
-    pub(crate) fn len(&self) -> u64 {
-        match self {
-            Self::Mcap(source) => source.len,
-            Self::Sqlite(sqlite) => sqlite.len(),
-        }
-    }
-
-    /// Largest record that is read [bytes].
-    pub(crate) fn limit(&self) -> u64 {
-        match self {
-            Self::Mcap(source) => source.limit,
-            Self::Sqlite(sqlite) => sqlite.limit(),
-        }
-    }
-
-    /// The error of something larger than what is read.
-    pub(crate) fn too_large(&self, offset: u64, what: &'static str, bytes: u64) -> BagError {
-        BagError::TooLarge { path: self.path().to_owned(), offset, what, bytes, limit: self.limit() }
-    }
-
-    /// An error at an offset of this file.
-    pub(crate) fn corrupt(&self, offset: u64, reason: impl Into<String>) -> BagError {
-        BagError::Corrupt { path: self.path().to_owned(), offset, reason: reason.into() }
-    }
-}
-
-/// What a run of messages is stored as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// A chunk.
-    Chunk,
-    /// Message records outside chunks, one behind the other.
-    Loose,
-    /// Rows of a table.
-    Rows(Rows),
-}
-
-/// Where messages lie that are read in one go.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct ChunkRef {
-    /// Offset of the chunk's record, or of the run; for rows, their number.
-    pub offset: u64,
-    /// Length, prefix included.
-    pub len: u64,
-    /// Earliest log time [ns].
-    pub start: u64,
-    /// Latest log time [ns].
-    pub end: u64,
-    /// How it is stored.
-    pub kind: Kind,
-    /// Channels that have messages here; `None` when the index does not tell.
-    pub channels: Option<Vec<u16>>,
-}
-
-/// A schema as the file holds it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Schema {
-    pub name: String,
-    pub encoding: String,
-    pub data: Arc<[u8]>,
-}
-
-/// An attachment's header, and where its record is.
-#[derive(Debug, Clone)]
-pub(crate) struct AttachmentRef {
-    pub header: AttachmentHeader,
-    /// Length of its data [bytes].
-    pub data_len: u64,
-    /// Offset in the file of the end of its data, where its checksum is.
-    pub data_end: u64,
-    pub place: Place,
-}
 
 /// All that is known of one file before its messages are read.
 #[derive(Debug)]

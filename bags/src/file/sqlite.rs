@@ -6,15 +6,15 @@ use std::{
     fs::{self, File},
     io::Read,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Mutex, PoisonError},
 };
 
-use mcap::records::{Channel, MessageHeader, Metadata, op};
+use mcap::records::{MessageHeader, op};
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::NamedTempFile;
 
 use super::{
-    index::{ChunkRef, FileIndex, Kind, Schema, Storage},
+    parts::{ChunkRef, Kind, Rows},
     record,
     source::{ReadOptions, is_packed, unpack_into},
 };
@@ -26,13 +26,6 @@ const MAGIC: &[u8; 16] = b"SQLite format 3\0";
 const HEADER_LEN: u64 = 100;
 /// Messages that are read in one go [bytes].
 const CHUNK_BYTES: u64 = 1 << 20;
-
-/// A run of rows in order of time: timestamp [ns] and row id of the first and the last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Rows {
-    first: (i64, i64),
-    last: (i64, i64),
-}
 
 /// An opened SQLite file.
 pub(crate) struct Sqlite {
@@ -63,12 +56,12 @@ pub(crate) fn is_sqlite(path: &Path) -> Result<bool> {
     Ok(len >= HEADER_LEN && file.read_exact(&mut start).is_ok() && start == *MAGIC)
 }
 
-impl FileIndex {
-    /// Reads the index of a SQLite file.
+impl Sqlite {
+    /// Opens a SQLite file and reads its small tables.
     ///
     /// # Errors
     /// [`BagError::Sqlite`] when the file is damaged or is none of rosbag2's.
-    pub(crate) fn open_sqlite(path: &Path, options: ReadOptions) -> Result<Self> {
+    pub(super) fn open(path: &Path, options: ReadOptions) -> Result<(Self, Tables)> {
         let mut unpacked = None;
         if is_packed(path) {
             let mut to = NamedTempFile::new().map_err(BagError::io("make a temporary file to unpack", path))?;
@@ -86,7 +79,7 @@ impl FileIndex {
         }
         let channels = (0..).zip(tables.topics.keys()).map(|(channel, topic)| (*topic, channel)).collect();
         let len = fs::metadata(opened).map_err(BagError::io("read", path))?.len();
-        let mut sqlite = Sqlite {
+        let sqlite = Self {
             path: path.to_owned(),
             len,
             limit: options.limit(),
@@ -94,43 +87,9 @@ impl FileIndex {
             channels,
             _unpacked: unpacked,
         };
-        let (chunks, counts) = sqlite.chunks()?;
-        let mut index = Self::empty(Storage::Sqlite(Arc::new(sqlite)));
-        (index.chunks, index.counts) = (chunks, counts);
-        index.profile = "ros2".to_owned();
-        index.library = "rosbag2 sqlite3".to_owned();
-        index.add_tables(tables);
-        Ok(index)
+        Ok((sqlite, tables))
     }
 
-    fn add_tables(&mut self, tables: Tables) {
-        for (channel, topic) in (0..).zip(tables.topics.into_values()) {
-            let id = channel + 1;
-            let known = tables.definitions.get(&topic.type_name).or_else(|| {
-                // Services are defined once for their requests, responses and events.
-                let (service, _) = topic.type_name.rsplit_once('_')?;
-                tables.definitions.get(service)
-            });
-            let (encoding, data) = match (known, swath_msgs::Interface::find(&topic.type_name)) {
-                (Some((encoding, text)), _) if !text.is_empty() => (encoding.as_str(), text.as_str()),
-                (_, Some(ours)) => ("ros2msg", ours.schema),
-                _ => ("", ""),
-            };
-            let (encoding, data) = (encoding.to_owned(), data.as_bytes().into());
-            self.schemas.insert(id, Schema { name: topic.type_name, encoding, data });
-            let metadata = [("offered_qos_profiles", topic.qos), ("topic_type_hash", topic.type_hash)];
-            let metadata = metadata.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-            let (topic, message_encoding) = (topic.name, topic.serialization_format);
-            self.channels.insert(channel, Channel { id: channel, schema_id: id, topic, message_encoding, metadata });
-        }
-        if let Some(information) = tables.information {
-            let metadata = [("serialized_metadata".to_owned(), information)].into();
-            self.metadata.push(Metadata { name: "rosbag2".to_owned(), metadata });
-        }
-    }
-}
-
-impl Sqlite {
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -152,7 +111,7 @@ impl Sqlite {
     }
 
     /// All messages in order of time, in runs that are read in one go, and the messages of each channel.
-    fn chunks(&mut self) -> Result<(Vec<ChunkRef>, BTreeMap<u16, u64>)> {
+    pub(super) fn chunks(&self) -> Result<(Vec<ChunkRef>, BTreeMap<u16, u64>)> {
         let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
         let (mut chunks, mut counts): (Vec<ChunkRef>, _) = (Vec::new(), BTreeMap::new());
         let rows = "SELECT timestamp, id, topic_id, length(data) FROM messages ORDER BY timestamp, id";
@@ -228,22 +187,22 @@ impl Sqlite {
 }
 
 /// A row of the table of topics.
-struct TopicRow {
-    name: String,
-    type_name: String,
-    serialization_format: String,
-    qos: String,
-    type_hash: String,
+pub(super) struct TopicRow {
+    pub name: String,
+    pub type_name: String,
+    pub serialization_format: String,
+    pub qos: String,
+    pub type_hash: String,
 }
 
 /// The small tables.
-struct Tables {
+pub(super) struct Tables {
     /// By topic id.
-    topics: BTreeMap<i64, TopicRow>,
+    pub topics: BTreeMap<i64, TopicRow>,
     /// Encoding and text by type.
-    definitions: BTreeMap<String, (String, String)>,
+    pub definitions: BTreeMap<String, (String, String)>,
     /// The bag's information as YAML.
-    information: Option<String>,
+    pub information: Option<String>,
 }
 
 impl Tables {

@@ -11,7 +11,8 @@ use mcap::{
 };
 
 use super::{
-    index::{ChunkRef, FileIndex, Kind, load_chunk},
+    index::{FileIndex, load_chunk},
+    parts::{ChunkRef, Kind},
     record::{self, PREFIX_LEN, Records},
     source::Source,
     unpack::Unpacker,

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use mcap::records::ChunkHeader;
 
-use super::{index::Storage, source::Source};
+use super::{source::Source, storage::Storage};
 use crate::error::Result;
 
 /// The first bytes of a Zstandard frame. No CDR begins so.

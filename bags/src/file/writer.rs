@@ -11,10 +11,11 @@ use mcap::{
 };
 
 use super::{
+    attachment::Attachment,
     chunk::{Chunk, Compressor},
     record,
 };
-use crate::{reader::Attachment, topic::Topic};
+use crate::topic::Topic;
 
 /// Where a file's bytes go: positional writes, and cutting off what does not fit.
 pub(crate) trait Disk: Send {

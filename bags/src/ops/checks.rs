@@ -1,6 +1,6 @@
 //! What validation checks on each topic.
 
-use super::validate::{Report, SHOWN, TopicReport};
+use super::report::{Report, SHOWN, TopicReport};
 use crate::{
     error::chain,
     reader::{BagTopic, Message},

@@ -9,8 +9,9 @@ use super::note;
 use crate::{
     error::{BagError, Result},
     file::source::ReadOptions,
+    losses::{Losses, RECORDING},
     reader::{Bag, Filter},
-    writer::{BagOptions, BagSummary, BagWriter, Losses, RECORDING, TopicId},
+    writer::{BagOptions, BagSummary, BagWriter, TopicId},
 };
 
 /// A new bag, and what of the old ones could not be read.

@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use crate::{
     error::Result,
+    losses::RECORDING,
     qos::{self, QosProfile},
     reader::{Bag, BagTopic, Filter},
-    writer::RECORDING,
 };
 
 /// Longest metadata value that is printed [characters].

@@ -7,7 +7,10 @@ pub mod copy;
 pub mod info;
 pub mod recover;
 pub mod reindex;
+mod report;
 pub mod validate;
+
+pub use report::{Report, TopicReport};
 
 use crate::error::{BagError, chain};
 

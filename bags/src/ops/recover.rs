@@ -8,15 +8,17 @@ use super::{copy::copy_metadata, note, validate::check_attachment};
 use crate::{
     error::{BagError, Result},
     file::{
-        index::{FileIndex, Storage, unpack},
+        attachment::Attachment,
+        index::{FileIndex, unpack},
         record::{self, Records},
         source::{ReadOptions, Source},
         sqlite::is_sqlite,
+        storage::Storage,
         unpack::{Unpacker, ZSTD_MAGIC},
         walk::{Place, Walk},
     },
     qos::QosTexts,
-    reader::{Attachment, Listing, Message, distinct},
+    reader::{Listing, Message, distinct},
     topic::Topic,
     writer::{BagOptions, BagSummary, BagWriter, TopicId},
 };

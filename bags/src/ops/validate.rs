@@ -2,60 +2,28 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use serde::Serialize;
-
 use mcap::{
     MAGIC,
     records::{Record, op},
 };
 
-use super::note;
+use super::{checks::TopicCheck, note, report::Report};
 use crate::{
     error::{BagError, Result, chain},
     file::{
-        index::{AttachmentRef, FileIndex, Storage},
+        index::FileIndex,
+        parts::AttachmentRef,
         record::{self, misplaced},
         source::{ReadOptions, Source},
+        storage::Storage,
         walk::Walk,
     },
     metadata::{BagInformation, FILE_NAME},
-    ops::checks::TopicCheck,
     reader::{Bag, Filter, metadata_path},
 };
 
-/// Faults of one kind that are written out before the rest is only counted.
-pub(super) const SHOWN: u64 = 5;
-
 /// The version of `metadata.yaml` from which on it has types' hashes.
 const HASH_SINCE: u32 = 7;
-
-/// What validation found.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct Report {
-    /// What makes the bag wrong.
-    pub faults: Vec<String>,
-    /// What is odd and allowed.
-    pub warnings: Vec<String>,
-    /// Messages checked.
-    pub messages: u64,
-    /// Findings by topic.
-    pub topics: Vec<TopicReport>,
-}
-
-/// What validation found on one topic.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct TopicReport {
-    /// Its name.
-    pub topic: String,
-    /// Its messages.
-    pub messages: u64,
-    /// Sequence numbers that are missing.
-    pub missing: u64,
-    /// Messages recorded after a later one.
-    pub out_of_order: u64,
-    /// Longest time between two messages [ns].
-    pub longest_gap_ns: u64,
-}
 
 /// Checks profile, schemas, channel metadata, `metadata.yaml`, checksums, the CDR of every
 /// message, sequence gaps, and time gaps longer than `max_gap_ns` where that is given.

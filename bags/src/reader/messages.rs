@@ -4,11 +4,12 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 
 use mcap::records::op;
 
-use super::{Bag, Filter};
+use super::{Bag, select::Filter};
 use crate::{
     error::Result,
     file::{
-        index::{ChunkRef, FileIndex},
+        index::FileIndex,
+        parts::ChunkRef,
         record::{self, PREFIX_LEN, Records},
         unpack::{Unpacker, ZSTD_MAGIC},
     },
@@ -31,6 +32,16 @@ pub struct Message<'a> {
     pub publish_time: u64,
     /// The message; CDR with its encapsulation header. One that was compressed by itself is unpacked.
     pub data: &'a [u8],
+}
+
+impl Bag {
+    /// The messages that a filter lets through, in order of log time, then of recording.
+    ///
+    /// # Errors
+    /// [`BagError::Option`] when the filter names a topic that is not in the bag.
+    pub fn messages(&self, filter: &Filter) -> Result<Messages<'_>> {
+        Messages::new(self, filter)
+    }
 }
 
 /// A message in an unpacked chunk.

@@ -3,6 +3,7 @@
 mod files;
 mod messages;
 mod select;
+mod topic;
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -14,43 +15,25 @@ pub(crate) use files::{Listing, metadata_path};
 use mcap::records::Metadata;
 pub use messages::{Message, Messages};
 pub use select::{Filter, TopicPattern};
+pub use topic::BagTopic;
 
 use crate::{
     error::{BagError, Result, chain},
     file::{
-        index::{AttachmentRef, FileIndex, Storage},
+        attachment::Attachment,
+        index::FileIndex,
         source::{ReadOptions, Source},
         sqlite::is_sqlite,
-        walk::Place,
+        storage::Storage,
     },
+    losses::{Losses, RECORDING},
     metadata::BagInformation,
     qos::QosTexts,
-    schema,
     topic::{Topic, TopicKey},
-    writer::{Losses, RECORDING},
 };
 
 /// The metadata record in which rosbag2 repeats a file's information.
 const ROSBAG2: &str = "rosbag2";
-
-/// A topic of an open bag.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BagTopic {
-    /// Name, type, schema, QoS.
-    pub topic: Topic,
-    /// Messages in all files.
-    pub messages: u64,
-}
-
-impl BagTopic {
-    /// Parses the topic's schema.
-    ///
-    /// # Errors
-    /// [`BagError::Schema`] when it is malformed, or of an encoding that is not known.
-    pub fn parse_schema(&self) -> Result<schema::Schema> {
-        schema::Schema::of(&self.topic)
-    }
-}
 
 /// What one file of a bag holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,37 +56,6 @@ pub struct BagFile {
     pub end: u64,
     /// Chunk compressions by MCAP name with the number of chunks.
     pub compressions: BTreeMap<String, u64>,
-}
-
-/// A file that was put into a bag beside the messages.
-#[derive(Debug, Clone)]
-pub struct Attachment {
-    /// Its name.
-    pub name: String,
-    /// Its media type.
-    pub media_type: String,
-    /// Time of recording [ns].
-    pub log_time: u64,
-    /// Time of its making [ns]; 0 when not known.
-    pub create_time: u64,
-    /// Length of its data [bytes].
-    pub bytes: u64,
-    pub(crate) source: Arc<Source>,
-    pub(crate) place: Place,
-}
-
-impl Attachment {
-    pub(crate) fn of(source: &Arc<Source>, found: &AttachmentRef) -> Self {
-        Self {
-            name: found.header.name.clone(),
-            media_type: found.header.media_type.clone(),
-            log_time: found.header.log_time,
-            create_time: found.header.create_time,
-            bytes: found.data_len,
-            source: Arc::clone(source),
-            place: found.place,
-        }
-    }
 }
 
 /// A bag open for reading: a directory with MCAP or SQLite files, or a single file.
@@ -232,8 +184,8 @@ impl Bag {
                 self.topics.push(BagTopic { topic, messages: 0 });
                 self.topics.len() - 1
             });
-            let messages = &mut self.topics[index].messages;
-            *messages = messages.saturating_add(file.counts.get(&id).copied().unwrap_or(0));
+            let counted = &mut self.topics[index].messages;
+            *counted = counted.saturating_add(file.counts.get(&id).copied().unwrap_or(0));
             by_channel.insert(id, index);
         }
         self.channels.push(by_channel);
@@ -354,14 +306,6 @@ impl Bag {
     /// `metadata.yaml`, or what a single file of rosbag2 says in its place, but for the topics: see [`topics`](Self::topics).
     pub fn information(&self) -> Option<&BagInformation> {
         self.information.as_ref()
-    }
-
-    /// The messages that a filter lets through, in order of log time, then of recording.
-    ///
-    /// # Errors
-    /// [`BagError::Option`] when the filter names a topic that is not in the bag.
-    pub fn messages(&self, filter: &Filter) -> Result<Messages<'_>> {
-        Messages::new(self, filter)
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use regex::Regex;
 
-use super::BagTopic;
+use super::topic::BagTopic;
 use crate::error::{BagError, Result};
 
 /// Selects topics by name and by regular expression, as `ros2 bag` does.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use swath_msgs::definition::{self, Base, Named, Shape};
 
-use super::{Count, Element, Field, Primitive, Schema, Struct};
+use super::types::{Count, Element, Field, Primitive, Schema, Struct};
 use crate::error::{BagError, Result};
 
 /// Deepest nesting of messages that is accepted.
@@ -14,13 +14,19 @@ struct Parser<'a> {
     type_name: &'a str,
 }
 
-pub(super) fn parse(type_name: &str, text: &str) -> Result<Schema> {
-    let parser = Parser { type_name };
-    let definitions = definition::definitions(type_name, text).map_err(|e| parser.error(e.line, e.reason))?;
-    let schema = parser.resolve(definitions)?;
-    let mut known = vec![Depth::Unknown; schema.structs.len()];
-    parser.depth(&schema, 0, 0, &mut known)?;
-    Ok(schema)
+impl Schema {
+    /// Parses the text of a `ros2msg` or `ros2idl` schema.
+    ///
+    /// # Errors
+    /// [`BagError::Schema`] when the text is malformed, lacks a type or contains itself.
+    pub fn parse(type_name: &str, text: &str) -> Result<Self> {
+        let parser = Parser { type_name };
+        let definitions = definition::definitions(type_name, text).map_err(|e| parser.error(e.line, e.reason))?;
+        let schema = parser.resolve(definitions)?;
+        let mut known = vec![Depth::Unknown; schema.structs.len()];
+        parser.depth(&schema, 0, 0, &mut known)?;
+        Ok(schema)
+    }
 }
 
 impl Parser<'_> {

@@ -150,13 +150,20 @@ impl Tap {
 
     /// Takes what has come and hands it to the sink in the order of coming; returns the number of messages.
     ///
+    /// Where more has come than is taken at once, the node's signal is raised, so that nobody waits for the next sample
+    /// before the rest is taken.
+    ///
     /// # Errors
     /// Whatever DDS or the sink reports.
     pub fn take_all(&mut self, sink: &mut dyn Sink) -> Result<usize> {
         self.announce(sink)?;
         let mut batch = std::mem::take(&mut self.batch);
+        let mut more = false;
         for (number, source) in self.sources.iter_mut().enumerate() {
-            source.take_all(number, &mut batch)?;
+            more |= source.take_all(number, &mut batch)?;
+        }
+        if more {
+            self.node.signal().raise();
         }
         batch.sort_by_key(Taken::received_ns);
         let taken = batch.len();

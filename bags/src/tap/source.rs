@@ -47,13 +47,13 @@ impl Source {
         Ok(Self { topic, is_clock, subscription, stamp, entry, lost: 0 })
     }
 
-    /// Takes what has come.
-    pub(super) fn take_all(&mut self, number: usize, batch: &mut Vec<Taken>) -> Result<()> {
+    /// Takes what has come; returns whether there may be more, which raises no signal.
+    pub(super) fn take_all(&mut self, number: usize, batch: &mut Vec<Taken>) -> Result<bool> {
         for _ in 0..TURN {
-            let Some(sample) = self.subscription.take()? else { break };
+            let Some(sample) = self.subscription.take()? else { return Ok(false) };
             batch.push(Taken { source: number, sample });
         }
-        Ok(())
+        Ok(true)
     }
 
     /// The simulated time in a message's bytes [ns].

@@ -5,19 +5,22 @@ use std::{
     fs::{self, File},
     io,
     path::{Path, PathBuf},
-    sync::{Arc, PoisonError},
-    time::Duration,
+    sync::Arc,
 };
 
 use mcap::records::Metadata;
 
-use super::{BagOptions, BagSummary, Job, Losses, RECORDING, Shared, State};
+use super::{
+    options::{BagOptions, BagSummary},
+    queue::{Job, Shared},
+};
 use crate::{
     error::{BagError, Result},
     file::{
         chunk::{Chunk, Compressor},
         writer::{Disk, FileSummary, FileWriter, TopicIds},
     },
+    losses::{Losses, RECORDING},
     metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata},
     topic::Topic,
 };
@@ -82,12 +85,12 @@ impl Storage {
 
     /// Takes jobs until the writer closes or storing fails.
     pub(super) fn run(mut self, shared: &Shared) -> Result<BagSummary> {
-        while let Some(job) = next_job(shared) {
+        while let Some(job) = shared.next_job() {
             if let Err(error) = self.store(job, shared) {
                 return self.stop(error, shared);
             }
         }
-        self.lost = lost(shared);
+        self.lost = shared.lost();
         match self.finish_bag() {
             Ok(()) => Ok(self.bag_summary()),
             Err(error) => self.stop(error, shared),
@@ -114,7 +117,7 @@ impl Storage {
                 if stored.is_err() {
                     self.unsaved += chunk.messages;
                 }
-                recycle(chunk, shared);
+                shared.recycle(chunk);
                 stored
             }
         }
@@ -176,8 +179,8 @@ impl Storage {
     /// After a failure: closes the bag as far as it goes and refuses further messages.
     fn stop(mut self, error: io::Error, shared: &Shared) -> Result<BagSummary> {
         let path = self.dir.join(self.file_name());
-        self.unsaved += drain(shared);
-        self.lost = lost(shared);
+        self.unsaved += shared.drain();
+        self.lost = shared.lost();
         let ended = if self.unfinished { self.finish_in_less_room() } else { self.write_yaml() };
         if ended.is_ok() && BagError::is_disk_full(&error) {
             let kept = self.bag_summary().messages;
@@ -296,69 +299,6 @@ fn file_information(file: &Finished) -> FileInformation {
         duration: Nanoseconds { nanoseconds: file.summary.end - file.summary.start },
         message_count: file.summary.messages,
     }
-}
-
-/// The next job, or a chunk that has become old; `None` when the writer has closed.
-fn next_job(shared: &Shared) -> Option<Job> {
-    let interval = shared.options.flush_interval;
-    let mut state = shared.lock();
-    loop {
-        if let Some(job) = state.queue.pop_front() {
-            if matches!(job, Job::Chunk(_)) {
-                state.queued_chunks -= 1;
-                shared.room.notify_all();
-            }
-            return Some(job);
-        }
-        if state.closing {
-            return None;
-        }
-        if is_old(&state, interval) && shared.options.snapshot_bytes.is_none() {
-            state.seal(None);
-            continue;
-        }
-        // A chunk grows no older than one and a quarter intervals.
-        let waited = shared.work.wait_timeout(state, interval / 4);
-        state = waited.unwrap_or_else(PoisonError::into_inner).0;
-    }
-}
-
-fn is_old(state: &State, interval: Duration) -> bool {
-    state.front.opened.is_some_and(|opened| opened.elapsed() >= interval)
-}
-
-/// Gives a stored chunk's memory back.
-fn recycle(mut chunk: Chunk, shared: &Shared) {
-    chunk.clear();
-    let mut state = shared.lock();
-    if state.spare.len() < super::QUEUE_CHUNKS {
-        state.spare.push(chunk);
-    }
-}
-
-/// What the writer was told of losses.
-fn lost(shared: &Shared) -> Losses {
-    let state = shared.lock();
-    let mut losses = state.carried.clone();
-    for known in state.topics.iter().filter(|t| t.lost > 0) {
-        *losses.by_topic.entry(known.topic.name.clone()).or_insert(0) += known.lost;
-    }
-    losses
-}
-
-/// Refuses further messages; returns how many were waiting to be stored.
-fn drain(shared: &Shared) -> u64 {
-    let mut state = shared.lock();
-    state.stopped = true;
-    let queued = state.queue.drain(..).map(|job| match job {
-        Job::Chunk(chunk) => chunk.messages,
-        Job::Topic(..) | Job::Metadata(_) | Job::Attachment(_) | Job::Split => 0,
-    });
-    let lost = queued.sum::<u64>() + state.front.messages;
-    state.front.clear();
-    state.queued_chunks = 0;
-    shared.room.notify_all();
-    lost
 }
 
 #[cfg(test)]

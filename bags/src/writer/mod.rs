@@ -1,221 +1,29 @@
 //! Writes bags: messages are gathered in memory here, and compressed and stored by a thread.
 
 mod disk;
+mod options;
+mod queue;
 
 use std::{
-    collections::{BTreeMap, HashMap, VecDeque},
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Condvar, Mutex, PoisonError},
     thread::JoinHandle,
-    time::Duration,
 };
 
 use mcap::records::{MessageHeader, Metadata};
+pub use options::{BagOptions, BagSummary};
+pub use queue::TopicId;
+use queue::{Job, QUEUE_CHUNKS, Shared, State, TopicState};
 
 use crate::{
     error::{BagError, Result},
-    file::{
-        chunk::{Chunk, Compression, Compressor},
-        writer::TopicIds,
-    },
-    reader::{Attachment, Message},
-    topic::{Definition, Topic, TopicKey},
+    file::{attachment::Attachment, chunk::Compressor, writer::TopicIds},
+    losses::Losses,
+    reader::Message,
+    topic::Topic,
 };
-
-/// Finished chunks that may wait for the disk before `write` blocks.
-const QUEUE_CHUNKS: usize = 32;
-
-/// How a bag is written.
-#[derive(Debug, Clone)]
-pub struct BagOptions {
-    /// Compression of chunks.
-    pub compression: Compression,
-    /// Level of zstd, 1 (fast) to 19 (small).
-    pub zstd_level: i32,
-    /// A chunk is closed when its messages reach this size [bytes].
-    pub chunk_bytes: usize,
-    /// A chunk is closed at this age, so that a kill loses no more [wall time].
-    pub flush_interval: Duration,
-    /// A new file is started when one reaches this size [bytes].
-    pub max_file_bytes: Option<u64>,
-    /// A new file is started when one spans this log time.
-    pub max_file_duration: Option<Duration>,
-    /// Snapshot mode: keep this many bytes in memory and store them on [`BagWriter::snapshot`].
-    pub snapshot_bytes: Option<usize>,
-    /// MCAP profile.
-    pub profile: String,
-    /// Pairs for `custom_data` in `metadata.yaml`.
-    pub custom_data: BTreeMap<String, String>,
-    /// ROS distribution named in `metadata.yaml`.
-    pub ros_distro: String,
-}
-
-impl Default for BagOptions {
-    fn default() -> Self {
-        Self {
-            compression: Compression::Zstd,
-            zstd_level: 1,
-            chunk_bytes: 1 << 20,
-            flush_interval: Duration::from_millis(500),
-            max_file_bytes: None,
-            max_file_duration: None,
-            snapshot_bytes: None,
-            profile: "ros2".to_owned(),
-            custom_data: BTreeMap::new(),
-            ros_distro: "jazzy".to_owned(),
-        }
-    }
-}
-
-/// A topic of one [`BagWriter`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct TopicId(u16);
-
-/// What a closed bag holds.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct BagSummary {
-    /// Messages in all files.
-    pub messages: u64,
-    /// Messages that were to be in the bag and are not.
-    pub lost: u64,
-    /// Messages by topic name.
-    pub counts: BTreeMap<String, u64>,
-    /// Number of files.
-    pub files: usize,
-    /// Size of all files [bytes].
-    pub bytes: u64,
-    /// Earliest log time [ns].
-    pub start: u64,
-    /// Latest log time [ns].
-    pub end: u64,
-}
-
-/// The metadata record that tells how a recording went.
-pub const RECORDING: &str = "swath_recording";
-
-/// Messages that were to be in a bag and are not.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Losses {
-    /// Lost on the way to the writer, by topic.
-    pub by_topic: BTreeMap<String, u64>,
-    /// Lost because they could not be stored.
-    pub unsaved: u64,
-}
-
-impl Losses {
-    const TOTAL: &str = "lost_messages";
-    const UNSAVED: &str = "lost_messages unsaved";
-
-    /// All lost messages.
-    pub fn total(&self) -> u64 {
-        self.by_topic.values().sum::<u64>() + self.unsaved
-    }
-
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.unsaved += other.unsaved;
-        for (topic, n) in &other.by_topic {
-            *self.by_topic.entry(topic.clone()).or_insert(0) += n;
-        }
-    }
-
-    /// As the pairs of a [`RECORDING`] record.
-    fn to_metadata(&self) -> BTreeMap<String, String> {
-        let by_topic = self.by_topic.iter();
-        let by_topic = by_topic.map(|(topic, n)| (format!("{} {topic}", Self::TOTAL), n.to_string()));
-        let total = (Self::TOTAL.to_owned(), self.total().to_string());
-        by_topic.chain([total, (Self::UNSAVED.to_owned(), self.unsaved.to_string())]).collect()
-    }
-
-    /// From the pairs of a [`RECORDING`] record.
-    pub fn from_metadata(metadata: &BTreeMap<String, String>) -> Self {
-        let mut losses = Self::default();
-        for (key, value) in metadata {
-            let n = value.parse().unwrap_or(0);
-            if key == Self::UNSAVED {
-                losses.unsaved = n;
-            } else if let Some(topic) = key.strip_prefix("lost_messages /") {
-                losses.by_topic.insert(format!("/{topic}"), n);
-            }
-        }
-        losses
-    }
-}
-
-/// What the disk thread has to do, in order.
-enum Job {
-    Topic(Arc<Topic>, TopicIds),
-    Metadata(Metadata),
-    Attachment(Box<Attachment>),
-    Chunk(Chunk),
-    Split,
-}
-
-struct TopicState {
-    topic: Arc<Topic>,
-    sequence: u32,
-    lost: u64,
-}
-
-#[derive(Default)]
-struct State {
-    topics: Vec<TopicState>,
-    ids: HashMap<TopicKey, TopicId>,
-    schemas: HashMap<(String, Definition), u16>,
-    front: Chunk,
-    spare: Vec<Chunk>,
-    queue: VecDeque<Job>,
-    queued_chunks: usize,
-    ring: VecDeque<Chunk>,
-    ring_bytes: usize,
-    file_start: Option<u64>,
-    carried: Losses,
-    written: u64,
-    closing: bool,
-    stopped: bool,
-}
-
-impl State {
-    /// Moves the gathered messages on: to the disk, or into the ring in snapshot mode.
-    fn seal(&mut self, snapshot_bytes: Option<usize>) {
-        if self.front.is_empty() {
-            return;
-        }
-        let next = self.spare.pop().unwrap_or_default();
-        let full = std::mem::replace(&mut self.front, next);
-        let Some(limit) = snapshot_bytes else {
-            self.queue.push_back(Job::Chunk(full));
-            self.queued_chunks += 1;
-            return;
-        };
-        self.ring_bytes += full.data.len();
-        self.ring.push_back(full);
-        while self.ring_bytes > limit {
-            let Some(mut oldest) = self.ring.pop_front() else {
-                break;
-            };
-            self.ring_bytes -= oldest.data.len();
-            oldest.clear();
-            self.spare.push(oldest);
-        }
-    }
-}
-
-struct Shared {
-    options: BagOptions,
-    state: Mutex<State>,
-    /// Signals the disk thread: there is a job, or the end has come.
-    work: Condvar,
-    /// Signals blocked writers: the queue has room again.
-    room: Condvar,
-}
-
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // No code panics while it holds the lock halfway through a change.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// A bag being written: `<dir>/<dir's name>_0.mcap` and on, and `<dir>/metadata.yaml`.
 ///

@@ -8,10 +8,10 @@ use anyhow::{Context, Result, ensure};
 use swath_ground::requests::store::Store;
 use swath_mission::file::Mission;
 use swath_mission::orders::geojson;
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::order::Order;
 use swath_mission::requests::logic::RequestLogic;
 use swath_msgs::swath_msgs as msg;
-use swath_node::orders::strip_request;
+use swath_node::orders::request_message;
 use swath_ros::{Client, Environment, Node, RosArgs, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripRequest;
@@ -103,7 +103,7 @@ impl Drop for Manager {
 }
 
 /// Strips spread over the part of the Earth that the satellite sees, no two the same.
-fn named(number: u32) -> NamedRequest {
+fn order(number: u32) -> Order {
     let golden = f64::from(number) * 0.618_033_988_749_895;
     let latitude = f64::from(number % 8009) / 8009.0 * 90.0 - 45.0;
     let longitude = golden.fract() * 340.0 - 170.0;
@@ -116,13 +116,13 @@ fn named(number: u32) -> NamedRequest {
         acquisition_speed_m_s: 3000.0,
         bidirectional: false,
     };
-    NamedRequest::new(format!("b{number}"), format!("bench {number}"), request)
+    Order::new(format!("b{number}"), format!("bench {number}"), request)
 }
 
 /// Seconds for `swath strips submit` from its start to its end.
 fn submit_file(swath: &Path, folder: &Path) -> Result<f64> {
     let file: PathBuf = folder.join("strips.geojson");
-    geojson::write(&file, &(0..FILE).map(named).collect::<Vec<_>>())?;
+    geojson::write(&file, &(0..FILE).map(order).collect::<Vec<_>>())?;
     // The node has come up by then: what is measured is the submission.
     let ask = || local(swath).args(["strips", "list", "--limit", "1"]).stdout(Stdio::null()).status();
     ensure!(ask()?.success(), "the request manager does not answer");
@@ -135,7 +135,7 @@ fn submit_file(swath: &Path, folder: &Path) -> Result<f64> {
 
 fn submit_all(client: &Client<msg::SubmitStrips>, numbers: std::ops::Range<u32>, batch: u32) -> Result<()> {
     for first in numbers.clone().step_by(batch as usize) {
-        let requests = (first..(first + batch).min(numbers.end)).map(|number| strip_request(&named(number)));
+        let requests = (first..(first + batch).min(numbers.end)).map(|number| request_message(&order(number)));
         let answer = client.call(msg::SubmitStripsRequest { requests: requests.collect::<Vec<_>>() }, TIMEOUT)?;
         let refused = answer.results.iter().find(|result| !result.accepted);
         ensure!(refused.is_none(), "a strip was refused: {refused:?}");

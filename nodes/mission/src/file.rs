@@ -11,7 +11,7 @@ use swath_sim::model::Model;
 use swath_sim::planner::PlannerSpec;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
-use swath_sim::time::Tick;
+use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::spacecraft::Spacecraft;
@@ -19,7 +19,8 @@ use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
 use crate::orders::geojson;
-use crate::orders::geojson::{Lengths, NamedRequest, RequestsFileError};
+use crate::orders::geojson::{Lengths, RequestsFileError};
+use crate::orders::order::Order;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
 
@@ -234,6 +235,15 @@ impl Mission {
         serde_json::to_string(&identity).unwrap_or_default()
     }
 
+    /// Epoch [s since 1970-01-01 UTC] and control tick of the mission of an identity.
+    #[must_use]
+    pub fn clock_of(identity: &str) -> Option<(u32, TickPeriod)> {
+        let identity: serde_json::Value = serde_json::from_str(identity).ok()?;
+        let epoch_unix_s = identity.get(2)?.as_u64()?.try_into().ok()?;
+        let frequency_hz = identity.get(4)?.pointer("/control/frequency_hz")?.as_f64()?;
+        Some((epoch_unix_s, TickPeriod::from_frequency(frequency_hz).ok()?))
+    }
+
     /// Tick at which the mission ends.
     #[must_use]
     pub fn horizon(&self, model: &Model) -> Tick {
@@ -244,7 +254,7 @@ impl Mission {
     ///
     /// # Errors
     /// When a file cannot be used.
-    pub fn initial_requests(&self) -> Result<Vec<NamedRequest>, MissionError> {
+    pub fn initial_requests(&self) -> Result<Vec<Order>, MissionError> {
         let mut requests = Vec::new();
         for file in &self.requests.files {
             requests.extend(geojson::read(file, Lengths::of(&self.sim))?);
@@ -253,9 +263,11 @@ impl Mission {
             let mut rng = rng::stream(self.seed, rng::CATALOGUE);
             let count = scenario.draw_count(&mut rng);
             let random = scenario.generate(&mut rng, count, self.sim.earth.radius_m);
-            requests.extend((1..).zip(random).map(|(number, request)| {
-                NamedRequest::new(format!("random-{number}"), format!("random {number}"), request)
-            }));
+            requests.extend(
+                (1..).zip(random).map(|(number, request)| {
+                    Order::new(format!("random-{number}"), format!("random {number}"), request)
+                }),
+            );
         }
         Ok(requests)
     }

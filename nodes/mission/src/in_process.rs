@@ -52,6 +52,9 @@ impl RequestKeeper for Desk {
     fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
         self.requests.set_situation(*situation);
         *candidates = self.requests.on_decision_point(task, situation.now, &[]).candidates;
+        for contradiction in self.requests.take_contradictions() {
+            tracing::error!("{contradiction}");
+        }
         // Nobody keeps a journal here.
         self.requests.take_journal();
     }
@@ -88,9 +91,9 @@ impl InProcessMission {
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
         let initial = mission.initial_requests()?;
         let requested = initial.len();
-        for named in initial {
+        for order in initial {
             // Why one is refused is in the request manager's counts.
-            _ = requests.submit(named);
+            _ = requests.submit(order, Tick(0));
         }
         let mut desk = Desk { requests, to_come: actions.into(), refused: Vec::new() };
         desk.take_while(|action| action.initial);
@@ -151,7 +154,7 @@ impl InProcessMission {
     ) -> Result<Option<(SettledTask, TaskLine)>, InProcessError> {
         let Some(settled) = self.mission.fly_one(planner, until)? else { return Ok(None) };
         let request = settled.record.strip.and_then(|id| self.requests().request(id));
-        let line = TaskLine::new(&settled, request.map(|request| request.named.name.as_str()));
+        let line = TaskLine::new(&settled, request.map(|request| request.order.name.as_str()));
         Ok(Some((settled, line)))
     }
 }

@@ -1,5 +1,6 @@
 //! What the nodes of a mission share: how one starts, its stamps, and the messages that several of them read or write.
 
+pub mod error;
 pub mod messages;
 pub mod node;
 pub mod orders;

@@ -2,66 +2,17 @@
 
 use nalgebra::Vector3;
 use swath_msgs::{geometry_msgs, swath_msgs as msg};
-use swath_sim::error::StripError;
 use swath_sim::model::Model;
 use swath_sim::task::{FailureReason, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::dynamics::BodyState;
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::spacecraft::StateSample;
-use swath_sim::world::strip::{Strip, StripId, StripRequest};
-use thiserror::Error;
+use swath_sim::world::strip::{Strip, StripId};
 
+use crate::error::MessageError;
+use crate::orders::request_of_strip;
 use crate::stamp::{INERTIAL_FRAME, Stamper};
-
-/// Why a message is not taken.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum MessageError {
-    /// A number is NaN, infinite or absurd.
-    #[error("{field} is {value}, the limit is ±{limit}")]
-    Number {
-        /// Field of the message.
-        field: &'static str,
-        /// Value given.
-        value: f64,
-        /// Largest magnitude.
-        limit: f64,
-    },
-    /// A constant that the interface does not know.
-    #[error("{field} is {value}, which is none of its constants")]
-    Constant {
-        /// Field of the message.
-        field: &'static str,
-        /// Value given.
-        value: u8,
-    },
-    /// Too many candidates.
-    #[error("{count} candidates were offered, the limit is {max}")]
-    Candidates {
-        /// Number given.
-        count: usize,
-        /// Most allowed.
-        max: usize,
-    },
-    /// A task of another length than its strip.
-    #[error("acquisition of strip {strip} takes {expected} ticks, the message says {given}")]
-    AcquisitionTime {
-        /// Number of the strip.
-        strip: u64,
-        /// Ticks that the strip takes.
-        expected: u32,
-        /// Ticks given.
-        given: u32,
-    },
-    /// A strip that cannot be flown.
-    #[error("strip {strip}: {source}")]
-    Strip {
-        /// Number of the strip.
-        strip: u64,
-        /// Why.
-        source: StripError,
-    },
-}
 
 /// Largest number in a task's result.
 const RESULT_MAX: f64 = 1e3;
@@ -154,20 +105,6 @@ pub fn task_record(result: &msg::TaskResult) -> Result<TaskRecord, MessageError>
             min_elevation: result.min_elevation,
         },
     })
-}
-
-/// What a strip asks for.
-#[must_use]
-pub fn request_of_strip(strip: &msg::Strip) -> StripRequest {
-    StripRequest {
-        start_latitude_deg: strip.start_latitude_deg,
-        start_longitude_deg: strip.start_longitude_deg,
-        end_latitude_deg: strip.end_latitude_deg,
-        end_longitude_deg: strip.end_longitude_deg,
-        priority: strip.priority,
-        acquisition_speed_m_s: strip.acquisition_speed,
-        bidirectional: false,
-    }
 }
 
 /// The strip of a message, whose acquisition takes `given` ticks.

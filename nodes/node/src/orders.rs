@@ -1,24 +1,24 @@
 //! Orders and actions as messages.
 
 use swath_mission::approval::Mode;
+use swath_mission::orders::action::Review;
 use swath_mission::orders::action::{Act, Action};
-use swath_mission::orders::geojson::NamedRequest;
-use swath_mission::requests::logic::Review;
+use swath_mission::orders::order::Order;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
 use swath_sim::time::Tick;
 use swath_sim::world::strip::{StripId, StripRequest};
 
-use crate::messages::MessageError;
+use crate::error::MessageError;
 use crate::stamp::{EARTH_FRAME, Stamper, nanoseconds};
 
 /// A request as the request manager takes it; its values are checked there, each with its reason.
 #[must_use]
-pub fn named_request(message: &msg::StripRequest) -> NamedRequest {
+pub fn order_of(message: &msg::StripRequest) -> Order {
     let unset = |time: &Time| *time == Time::default();
     // A time before 1970 is not the same as none.
     let end = |time: &Time| if unset(time) { 0 } else { nanoseconds(time).max(1) };
-    NamedRequest {
+    Order {
         client_ref: message.client_ref.clone(),
         submitter: message.submitter.clone(),
         name: message.name.clone(),
@@ -40,13 +40,13 @@ pub fn named_request(message: &msg::StripRequest) -> NamedRequest {
 
 /// A request as an operator submits it.
 #[must_use]
-pub fn strip_request(named: &NamedRequest) -> msg::StripRequest {
-    let request = &named.request;
+pub fn request_message(order: &Order) -> msg::StripRequest {
+    let request = &order.request;
     let time = |ns: u64| if ns == 0 { Time::default() } else { swath_ros::stamp(ns) };
     msg::StripRequest {
-        client_ref: named.client_ref.clone(),
-        submitter: named.submitter.clone(),
-        name: named.name.clone(),
+        client_ref: order.client_ref.clone(),
+        submitter: order.submitter.clone(),
+        name: order.name.clone(),
         start_latitude_deg: request.start_latitude_deg,
         start_longitude_deg: request.start_longitude_deg,
         end_latitude_deg: request.end_latitude_deg,
@@ -54,10 +54,40 @@ pub fn strip_request(named: &NamedRequest) -> msg::StripRequest {
         priority: request.priority,
         acquisition_speed: request.acquisition_speed_m_s,
         bidirectional: request.bidirectional,
-        valid_from: time(named.valid_from_ns),
-        valid_until: time(named.valid_until_ns),
-        hold_for_approval: named.hold_for_approval,
-        max_attempts: named.max_attempts,
+        valid_from: time(order.valid_from_ns),
+        valid_until: time(order.valid_until_ns),
+        hold_for_approval: order.hold_for_approval,
+        max_attempts: order.max_attempts,
+    }
+}
+
+/// The strip of an order, in its own degrees.
+#[must_use]
+pub fn strip(id: u64, order: &Order) -> msg::Strip {
+    let request = &order.request;
+    msg::Strip {
+        id,
+        name: order.name.clone(),
+        start_latitude_deg: request.start_latitude_deg,
+        start_longitude_deg: request.start_longitude_deg,
+        end_latitude_deg: request.end_latitude_deg,
+        end_longitude_deg: request.end_longitude_deg,
+        priority: request.priority,
+        acquisition_speed: request.acquisition_speed_m_s,
+    }
+}
+
+/// What a strip asks for.
+#[must_use]
+pub fn request_of_strip(strip: &msg::Strip) -> StripRequest {
+    StripRequest {
+        start_latitude_deg: strip.start_latitude_deg,
+        start_longitude_deg: strip.start_longitude_deg,
+        end_latitude_deg: strip.end_latitude_deg,
+        end_longitude_deg: strip.end_longitude_deg,
+        priority: strip.priority,
+        acquisition_speed_m_s: strip.acquisition_speed,
+        bidirectional: false,
     }
 }
 
@@ -97,11 +127,11 @@ pub fn operator_action(stamper: &Stamper, action: &Action) -> msg::OperatorActio
         ..To::default()
     };
     match &action.act {
-        Act::Submit(id, named) | Act::Replace(id, named) => {
+        Act::Submit(id, order) | Act::Replace(id, order) => {
             let submitted = matches!(action.act, Act::Submit(..));
             message.action = if submitted { To::ACTION_SUBMIT } else { To::ACTION_REPLACE };
             message.strip_id = id.0;
-            message.request = vec![strip_request(named)];
+            message.request = vec![request_message(order)];
         }
         Act::Cancel(id) => (message.action, message.strip_id) = (To::ACTION_CANCEL, id.0),
         Act::Review(id, review) => {
@@ -130,7 +160,7 @@ pub fn action(message: &msg::OperatorAction) -> Result<Action, MessageError> {
     let id = StripId(message.strip_id);
     let request = || {
         let request = message.request.first().ok_or(MessageError::Constant { field: "request", value: 0 })?;
-        Ok(Box::new(named_request(request)))
+        Ok(Box::new(order_of(request)))
     };
     let act = match message.action {
         From::ACTION_SUBMIT => Act::Submit(id, request()?),

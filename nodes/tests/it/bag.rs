@@ -11,7 +11,7 @@ use swath_bags::{Bag, BagOptions, BagWriter, Filter};
 use swath_ground::debrief::recorded::{NAMESPACE, Recorded};
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Act;
-use swath_mission::requests::logic::Review;
+use swath_mission::orders::action::Review;
 
 use crate::common;
 

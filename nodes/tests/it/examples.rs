@@ -7,9 +7,8 @@ use std::time::Duration;
 use crate::common;
 
 fn example(name: &str) -> Command {
-    // Cargo builds a package's examples before its tests, into a folder beside its programs.
     let path = Path::new(env!("CARGO_BIN_EXE_swath")).with_file_name("examples").join(name);
-    assert!(path.is_file(), "{} is missing", path.display());
+    assert!(path.is_file(), "{} is missing: run `cargo build --release --workspace --examples`", path.display());
     Command::new(path)
 }
 

@@ -15,10 +15,7 @@ impl Passes {
     pub(super) fn new(catalogue: &Catalogue) -> Self {
         let entries = (1..=catalogue.len() as u64).filter_map(|id| Some((StripId(id), catalogue.get(StripId(id))?)));
         let mut passes: Vec<Candidate> = entries
-            .flat_map(|(id, entry)| {
-                let candidate = move |&window| Candidate { id, strip: entry.strip, t_acq: entry.t_acq, window };
-                entry.windows.iter().map(candidate)
-            })
+            .flat_map(|(id, entry)| entry.windows.iter().map(move |&window| entry.candidate(id, window)))
             .collect();
         passes.sort_by_key(|pass| (pass.window.open, pass.id));
         let longest = passes.iter().map(|pass| pass.window.close.since(pass.window.open) as u64).max().unwrap_or(0);

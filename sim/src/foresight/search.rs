@@ -10,7 +10,7 @@ use crate::planner::{Allowance, Search};
 use crate::requests::catalogue::Candidate;
 use crate::vehicle::flight::Situation;
 use crate::vehicle::mrp;
-use crate::world::frames::{earth_to_inertial, reference_dcm};
+use crate::world::frames::reference_dcm;
 use crate::world::orbit::Orbit;
 use crate::world::strip::StripId;
 use crate::world::turn::Turn;
@@ -48,6 +48,25 @@ const PRIOR_RATE: f64 = 0.5 / 200.0;
 /// wider the beam, the better the plan, at a time in proportion. (Taking parts of the plan out and seeking them anew with
 /// a wider beam, a large-neighbourhood search, found next to nothing for the time that makes this beam three times
 /// wider.)
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use swath_sim::config::SimConfig;
+/// use swath_sim::foresight::{CANDIDATES, GroundSettings, plan, upper_bound};
+/// use swath_sim::learn::episode::{Env, EpisodeConfig};
+/// use swath_sim::model::Model;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut config = SimConfig::default();
+/// config.planning.candidates = CANDIDATES;
+/// let episode = EpisodeConfig { orbits: 0.1, ..EpisodeConfig::default() };
+/// let env = Env::episode(Arc::new(Model::new(config)?), &episode, 7);
+/// let best = plan(&env, &GroundSettings { width: 1, branches: 3, ..GroundSettings::default() });
+/// assert!(!best.tasks.is_empty() && best.reward < upper_bound(&env));
+/// # Ok(())
+/// # }
+/// ```
 #[must_use]
 pub fn plan(env: &Env, settings: &GroundSettings) -> Plan {
     let mut ground = Ground::new(env, settings);
@@ -199,9 +218,8 @@ impl<'a> Ground<'a> {
         let spacecraft = &self.model.config.spacecraft;
         let start = from.now.after(self.model.period.ticks_ceil(30.0)).max(candidate.window.open);
         let turn = self.earth.cos_sin(start);
-        let (target_E, scan_E) = candidate.strip.target_E(0.0);
-        let target_N = earth_to_inertial(turn, &target_E) * self.model.config.earth.radius_m;
-        let dcm_RN = reference_dcm(&self.orbit.position(start), &target_N, &earth_to_inertial(turn, &scan_E));
+        let (target_N, scan_N) = candidate.strip.target_N(0.0, turn, self.model.config.earth.radius_m);
+        let dcm_RN = reference_dcm(&self.orbit.position(start), &target_N, &scan_N);
         let angle = mrp::principal_angle(&mrp::subtract(&from.body.sigma_BN, &mrp::from_dcm(&dcm_RN)));
         // ‖σ‖ = tan(θ/4).
         let allowed = 4.0 * libm::atan(self.model.config.imaging.sigma_max);

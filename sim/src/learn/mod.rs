@@ -1,4 +1,5 @@
 //! What a learner meets: episodes, observations, hybrid actions.
 
 pub mod episode;
+pub mod hybrid;
 pub mod observation;

@@ -124,9 +124,7 @@ impl Frame {
         let radius = context.model.config.earth.radius_m;
         let mut reference = |ticks: u32, r_BN_N: Vector3<f64>| {
             let turn = self.earth.cos_sin(situation.now.after(ticks));
-            let (target_E, scan_E) = candidate.strip.target_E(f64::from(ticks) * dt);
-            let target_N = earth_to_inertial(turn, &target_E) * radius;
-            let scan_N = earth_to_inertial(turn, &scan_E);
+            let (target_N, scan_N) = candidate.strip.target_N(f64::from(ticks) * dt, turn, radius);
             mrp::euler_parameters_from_dcm(&reference_dcm(&r_BN_N, &target_N, &scan_N))
         };
         let rn = reference(0, situation.r_BN_N);

@@ -1,6 +1,6 @@
 //! The paper's heuristic: a fixed transition time, and the best priority per second among what is feasible.
 
-use super::{Decision, DecisionContext, Planner, PlannerError, wait};
+use super::decision::{Decision, DecisionContext, Planner, PlannerError, wait};
 
 /// Fixed-T heuristic (section V.A).
 #[derive(Clone, Debug)]

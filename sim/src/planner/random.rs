@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 
-use super::{Decision, DecisionContext, Planner, PlannerError, wait};
+use super::decision::{Decision, DecisionContext, Planner, PlannerError, wait};
 use crate::rng;
 
 /// Random policy (section V.A).

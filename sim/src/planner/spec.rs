@@ -7,7 +7,10 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Beam, BeamSearch, Heuristic, Lookahead, Planner, Random};
+use super::decision::Planner;
+use super::heuristic::Heuristic;
+use super::lookahead::{Beam, BeamSearch, Lookahead};
+use super::random::Random;
 
 /// Kinds of policies: hybrid ones with a transformer, with an MLP, standard hybrid PPO, and PPO over a grid.
 const KINDS: [&str; 4] = ["hop-ppo", "hop-ppo-mlp", "h-ppo", "discrete-ppo"];

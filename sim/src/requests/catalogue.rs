@@ -14,6 +14,8 @@ use crate::world::windows::{Window, WindowFinder};
 pub struct Candidate {
     /// Identity in the catalogue.
     pub id: StripId,
+    /// The same strip scanned the other way, if both may be chosen.
+    pub twin: Option<StripId>,
     /// The strip.
     pub strip: Strip,
     /// Acquisition time T_acq [ticks].
@@ -162,7 +164,7 @@ impl Catalogue {
     /// Adds a prepared strip; one without windows has expired.
     pub fn insert(&mut self, prepared: Prepared) -> StripId {
         let Prepared { strip, t_acq, windows } = prepared;
-        let id = StripId(self.entries.len() as u64 + 1);
+        let id = StripId::from_index(self.entries.len());
         let state = match windows.first() {
             Some(first) => {
                 self.queue.insert((first.close, id));
@@ -204,7 +206,7 @@ impl Catalogue {
     /// A strip by its identity.
     #[must_use]
     pub fn get(&self, id: StripId) -> Option<&Entry> {
-        self.entries.get(index(id)?)
+        self.entries.get(id.index()?)
     }
 
     /// Number of strips ever added.
@@ -231,9 +233,9 @@ impl Catalogue {
     pub fn next(&mut self, now: Tick, count: usize, candidates: &mut Vec<Candidate>) -> Vec<StripId> {
         let expired = self.move_on(now);
         candidates.clear();
-        candidates.extend(self.queue.iter().take(count).map(|&(_, id)| {
-            let entry = &self.entries[id.0 as usize - 1];
-            Candidate { id, strip: entry.strip, t_acq: entry.t_acq, window: entry.windows[entry.next] }
+        candidates.extend(self.queue.iter().take(count).filter_map(|&(_, id)| {
+            let entry = self.get(id)?;
+            entry.windows.get(entry.next).map(|&window| entry.candidate(id, window))
         }));
         expired
     }
@@ -245,7 +247,7 @@ impl Catalogue {
                 break;
             }
             self.queue.pop_first();
-            let entry = &mut self.entries[id.0 as usize - 1];
+            let Some(entry) = self.entry_mut(id) else { continue };
             if let Some(window) = entry.next_after(now) {
                 self.queue.insert((window.close, id));
             } else {
@@ -255,7 +257,9 @@ impl Catalogue {
         }
         while let Some(&(_, id)) = self.held.first().filter(|&&(close, _)| close <= now) {
             self.held.pop_first();
-            self.entries[id.0 as usize - 1].state = StripState::Expired;
+            if let Some(entry) = self.entry_mut(id) {
+                entry.state = StripState::Expired;
+            }
             expired.push(id);
         }
         expired
@@ -318,11 +322,17 @@ impl Catalogue {
     }
 
     fn entry_mut(&mut self, id: StripId) -> Option<&mut Entry> {
-        self.entries.get_mut(index(id)?)
+        self.entries.get_mut(id.index()?)
     }
 }
 
 impl Entry {
+    /// The strip in one of its windows.
+    #[must_use]
+    pub fn candidate(&self, id: StripId, window: Window) -> Candidate {
+        Candidate { id, twin: self.linked, strip: self.strip, t_acq: self.t_acq, window }
+    }
+
     /// The first window that closes after `now`; the ones before it are not looked at again.
     fn next_after(&mut self, now: Tick) -> Option<Window> {
         self.next += self.windows[self.next..].iter().take_while(|window| window.close <= now).count();
@@ -334,10 +344,6 @@ impl Entry {
         let closed = self.windows.partition_point(|window| window.close <= now);
         &self.windows[closed..]
     }
-}
-
-fn index(id: StripId) -> Option<usize> {
-    usize::try_from(id.0.checked_sub(1)?).ok()
 }
 
 #[cfg(test)]
@@ -423,9 +429,11 @@ mod tests {
         let expected = Window { open: Tick(window.open.0 + 3), close: Tick(window.close.0 - 5) };
         assert_eq!(clipped.windows, [expected]);
         let between = Validity { from: Tick(any.windows[0].close.0 + 1), until: Some(window.open) };
-        assert_eq!(catalogue.prepare(&model, &request, between, Tick(0)).unwrap_err().code(), 110);
+        let refused = catalogue.prepare(&model, &request, between, Tick(0));
+        assert!(matches!(refused, Err(StripError::NoWindow { .. })));
         let early = Validity { from: Tick(0), until: Some(Tick(3)) };
-        assert_eq!(catalogue.prepare(&model, &request, early, Tick(0)).unwrap_err().code(), 110);
+        let refused = catalogue.prepare(&model, &request, early, Tick(0));
+        assert!(matches!(refused, Err(StripError::NoWindow { .. })));
     }
 
     #[test]

@@ -18,6 +18,26 @@ pub struct BodyState {
     pub wheel_speed: Vector3<f64>,
 }
 
+/// Where in a tick a stage of RK4 is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// At its start.
+    Start,
+    /// In its middle.
+    Middle,
+    /// At its end.
+    End,
+}
+
+impl Stage {
+    /// Number of the time that it belongs to: start 0, middle 1, end 2.
+    #[inline]
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
 /// The body's and the wheels' constants.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -74,6 +94,28 @@ impl Plant {
     /// step.
     #[inline]
     pub fn step(&self, state: &mut BodyState, torque: &Vector3<f64>) {
+        self.integrate(state, torque, |_, _| *torque);
+    }
+
+    /// The same with a torque from outside on the body [N m], which is asked for at each stage of RK4 with its σ_BN.
+    #[inline]
+    pub fn step_under(
+        &self,
+        state: &mut BodyState,
+        torque: &Vector3<f64>,
+        mut external: impl FnMut(Stage, &Vector3<f64>) -> Vector3<f64>,
+    ) {
+        self.integrate(state, torque, |stage, sigma| torque - external(stage, sigma));
+    }
+
+    /// `braking` is the wheels' torque less that from outside.
+    #[inline(always)]
+    fn integrate(
+        &self,
+        state: &mut BodyState,
+        torque: &Vector3<f64>,
+        mut braking: impl FnMut(Stage, &Vector3<f64>) -> Vector3<f64>,
+    ) {
         let dt = self.dt;
         let half = 0.5 * dt;
         let (sigma0, omega0) = (state.sigma_BN, state.omega_BN_B);
@@ -81,10 +123,14 @@ impl Plant {
         let spin_half = spin0 + torque * half;
         let spin_end = spin0 + torque * dt;
 
-        let (ds1, dw1) = self.derivative(&sigma0, &omega0, &spin0, torque);
-        let (ds2, dw2) = self.derivative(&(sigma0 + ds1 * half), &(omega0 + dw1 * half), &spin_half, torque);
-        let (ds3, dw3) = self.derivative(&(sigma0 + ds2 * half), &(omega0 + dw2 * half), &spin_half, torque);
-        let (ds4, dw4) = self.derivative(&(sigma0 + ds3 * dt), &(omega0 + dw3 * dt), &spin_end, torque);
+        let (sigma, omega) = (sigma0, omega0);
+        let (ds1, dw1) = self.derivative(&sigma, &omega, &spin0, &braking(Stage::Start, &sigma));
+        let (sigma, omega) = (sigma0 + ds1 * half, omega0 + dw1 * half);
+        let (ds2, dw2) = self.derivative(&sigma, &omega, &spin_half, &braking(Stage::Middle, &sigma));
+        let (sigma, omega) = (sigma0 + ds2 * half, omega0 + dw2 * half);
+        let (ds3, dw3) = self.derivative(&sigma, &omega, &spin_half, &braking(Stage::Middle, &sigma));
+        let (sigma, omega) = (sigma0 + ds3 * dt, omega0 + dw3 * dt);
+        let (ds4, dw4) = self.derivative(&sigma, &omega, &spin_end, &braking(Stage::End, &sigma));
 
         let sixth = dt / 6.0;
         let sigma = sigma0 + (ds1 + (ds2 + ds3) * 2.0 + ds4) * sixth;
@@ -94,7 +140,7 @@ impl Plant {
         state.wheel_speed = spin_end * (1.0 / self.wheel_inertia) - omega;
     }
 
-    /// σ̇ and ω̇; `spin` is the wheels' absolute momentum Js·(Ω+ω) [N m s].
+    /// σ̇ and ω̇; `spin` is the wheels' absolute momentum Js·(Ω+ω) [N m s], `torque` the wheels' less that from outside.
     #[inline(always)]
     fn derivative(
         &self,
@@ -150,6 +196,24 @@ mod tests {
         }
         assert_relative_eq!(plant.momentum_N(&state), before, max_relative = 1e-6);
         assert!(state.sigma_BN.norm() <= 1.0);
+    }
+
+    #[test]
+    fn momentum_changes_by_the_integral_of_the_torque_from_outside() {
+        let plant = Plant::new(&SimConfig::default().spacecraft, 0.5);
+        let mut state = tumbling();
+        let before = plant.momentum_N(&state);
+        // A torque that stands still in N.
+        let torque_N = Vector3::new(2e-3, -1e-3, 3e-3);
+        for _ in 0..400 {
+            plant.step_under(&mut state, &Vector3::new(0.01, 0.02, -0.01), |_, sigma| mrp::to_dcm(sigma) * torque_N);
+        }
+        assert_relative_eq!(plant.momentum_N(&state), before + torque_N * 200.0, epsilon = 1e-6);
+        let mut alone = tumbling();
+        let mut none = tumbling();
+        plant.step(&mut alone, &Vector3::new(0.1, 0.2, 0.3));
+        plant.step_under(&mut none, &Vector3::new(0.1, 0.2, 0.3), |_, _| Vector3::zeros());
+        assert_eq!(alone, none);
     }
 
     #[test]

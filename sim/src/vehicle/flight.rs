@@ -8,6 +8,7 @@ use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::executive::{Executive, Sight};
 use crate::vehicle::guidance::GuidanceTick;
+use crate::vehicle::resources::{Activity, Imager};
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;
 
@@ -35,13 +36,16 @@ pub struct Flight {
     pub spacecraft: Spacecraft,
     executive: Executive,
     torque_pending: Vector3<f64>,
+    /// How long the imager warms up [ticks].
+    warm_up: u32,
 }
 
 impl Flight {
     /// A flight of a spacecraft by what `model` says of it.
     #[must_use]
     pub fn new(model: &Model, spacecraft: Spacecraft) -> Self {
-        Self { spacecraft, executive: Executive::new(model), torque_pending: Vector3::zeros() }
+        let warm_up = model.config.resources.as_ref().map_or(0, |it| model.period.ticks_ceil(it.imager_warm_up_s));
+        Self { spacecraft, executive: Executive::new(model), torque_pending: Vector3::zeros(), warm_up }
     }
 
     /// A flight in a planner's head: from what is known of the satellite, by what the model says of it.
@@ -109,9 +113,32 @@ impl Flight {
     #[inline]
     pub fn tick(&mut self) -> GuidanceTick {
         let tick = self.executive.tick(&sight(&mut self.spacecraft));
-        self.spacecraft.advance(&self.torque_pending);
+        if self.spacecraft.onboard().is_some() {
+            let activity = self.activity();
+            self.spacecraft.advance_doing(&self.torque_pending, activity);
+        } else {
+            self.spacecraft.advance(&self.torque_pending);
+        }
         self.torque_pending = tick.torque;
         tick
+    }
+
+    /// What imager, transmitter and thrusters do over the tick that begins now.
+    fn activity(&self) -> Activity {
+        let (now, mut activity) = (self.now(), Activity::default());
+        let Some((task, start)) = self.executive.task().filter(|(_, start)| *start <= now) else { return activity };
+        match *task {
+            Task::Image { id, t_pre, .. } => {
+                let to_go = start.after(t_pre).since(now);
+                if to_go <= 0 {
+                    activity.imager = Imager::Records(id);
+                } else if to_go <= i64::from(self.warm_up) {
+                    activity.imager = Imager::Warm;
+                }
+            }
+            Task::Wait { .. } => {}
+        }
+        activity
     }
 }
 

@@ -9,7 +9,7 @@ use crate::vehicle::control::{ControlLaw, TrackingError};
 use crate::vehicle::dynamics::{BodyState, Plant};
 use crate::vehicle::mrp;
 use crate::vehicle::mrp::EulerParameters;
-use crate::world::frames::{earth_to_inertial, reference_dcm, sin_elevation};
+use crate::world::frames::{reference_dcm, sin_elevation};
 use crate::world::strip::Strip;
 use crate::world::turn::Turn;
 
@@ -209,10 +209,7 @@ impl Guidance {
         body: &BodyState,
     ) -> (Vector3<f64>, f64) {
         let elapsed = now.since(start.after(t_pre)) as f64 * self.dt;
-        let (target_E, scan_E) = strip.target_E(elapsed);
-        let turn = self.earth.cos_sin(now);
-        let target_N = earth_to_inertial(turn, &target_E) * self.earth_radius;
-        let scan_N = earth_to_inertial(turn, &scan_E);
+        let (target_N, scan_N) = strip.target_N(elapsed, self.earth.cos_sin(now), self.earth_radius);
         let rn = mrp::euler_parameters_from_dcm(&reference_dcm(r_BN_N, &target_N, &scan_N));
         let bn = mrp::to_euler_parameters(&body.sigma_BN);
         let sigma_BR = mrp::from_euler_parameters(&mrp::relative_euler_parameters(&bn, &rn));

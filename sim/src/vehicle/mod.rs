@@ -1,4 +1,5 @@
-//! The satellite: its body and wheels, its control and guidance, its errors, and the closed loop.
+//! The satellite: its body and wheels, its control and guidance, its errors, its power, data and momentum, and the closed
+//! loop.
 
 pub mod control;
 pub mod dynamics;
@@ -8,4 +9,5 @@ pub mod flight;
 pub mod guidance;
 pub mod initial;
 pub mod mrp;
+pub mod resources;
 pub mod spacecraft;

@@ -90,6 +90,40 @@ pub fn to_dcm(sigma_BN: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + (8.0 * tilde * tilde - 4.0 * (1.0 - s2) * tilde) * k
 }
 
+/// Takes N components to B components without making the matrix: v + (8·σ×(σ×v) - 4(1-σ²)·σ×v)/(1+σ²)².
+#[derive(Clone, Copy, Debug)]
+pub struct Rotation {
+    sigma: Vector3<f64>,
+    twice: f64,
+    once: f64,
+}
+
+impl Rotation {
+    /// The rotation from N to B.
+    #[inline]
+    #[must_use]
+    pub fn new(sigma_BN: &Vector3<f64>) -> Self {
+        let s2 = sigma_BN.norm_squared();
+        let k = 1.0 / ((1.0 + s2) * (1.0 + s2));
+        Self { sigma: *sigma_BN, twice: 8.0 * k, once: 4.0 * (1.0 - s2) * k }
+    }
+
+    /// The rotation from B to N.
+    #[inline]
+    #[must_use]
+    pub fn back(&self) -> Self {
+        Self { sigma: -self.sigma, ..*self }
+    }
+
+    /// Components of a vector after the rotation.
+    #[inline]
+    #[must_use]
+    pub fn apply(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        let across = self.sigma.cross(v);
+        v + self.sigma.cross(&across) * self.twice - across * self.once
+    }
+}
+
 /// MRP set of `dcm_BN`, with ‖σ‖ ≤ 1.
 #[must_use]
 pub fn from_dcm(dcm_BN: &Matrix3<f64>) -> Vector3<f64> {
@@ -157,6 +191,12 @@ mod tests {
         #[test]
         fn dcm_round_trip(sigma in mrp()) {
             assert_relative_eq!(from_dcm(&to_dcm(&sigma)), sigma, epsilon = 1e-12);
+        }
+
+        #[test]
+        fn the_rotation_is_the_matrix(sigma in mrp(), v in mrp()) {
+            assert_relative_eq!(Rotation::new(&sigma).apply(&v), to_dcm(&sigma) * v, epsilon = 1e-14);
+            assert_relative_eq!(Rotation::new(&sigma).back().apply(&v), to_dcm(&sigma).transpose() * v, epsilon = 1e-14);
         }
 
         #[test]

@@ -9,6 +9,7 @@ use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
 use crate::vehicle::errors::{PlantErrors, Sensor};
 use crate::vehicle::initial::InitialState;
+use crate::vehicle::resources::{Activity, Onboard};
 use crate::world::orbit::Orbit;
 
 /// What the spacecraft tells of itself at a tick.
@@ -41,6 +42,7 @@ pub struct Spacecraft {
     pub torque_applied: Vector3<f64>,
     plant: Plant,
     measured: Option<Box<Measured>>,
+    onboard: Option<Box<Onboard>>,
 }
 
 /// What sensors that are not exact tell.
@@ -52,16 +54,30 @@ struct Measured {
 }
 
 impl Spacecraft {
-    /// A spacecraft at the epoch.
+    /// A spacecraft at the epoch, with the resources of its model.
     #[must_use]
     pub fn new(model: &Model, initial: &InitialState) -> Self {
-        Self::on_orbit(model, Orbit::new(&model.config, initial.orbit, model.period), initial.body, Tick(0))
+        let orbit = Orbit::new(&model.config, initial.orbit, model.period);
+        let onboard = Onboard::new(model, &orbit).map(Box::new);
+        Self { onboard, ..Self::on_orbit(model, orbit, initial.body, Tick(0)) }
     }
 
-    /// A spacecraft on an orbit at some tick, with nothing acting on it yet.
+    /// A spacecraft on an orbit at some tick, with nothing acting on it yet and boundless resources.
     #[must_use]
     pub fn on_orbit(model: &Model, orbit: Orbit, body: BodyState, now: Tick) -> Self {
-        Self { orbit, body, now, torque_applied: Vector3::zeros(), plant: model.plant.clone(), measured: None }
+        let (torque_applied, plant) = (Vector3::zeros(), model.plant.clone());
+        Self { orbit, body, now, torque_applied, plant, measured: None, onboard: None }
+    }
+
+    /// Its power, data and momentum, where they are not boundless.
+    #[must_use]
+    pub fn onboard(&self) -> Option<&Onboard> {
+        self.onboard.as_deref()
+    }
+
+    /// Its power, data and momentum, where they are not boundless.
+    pub fn onboard_mut(&mut self) -> Option<&mut Onboard> {
+        self.onboard.as_deref_mut()
     }
 
     /// From now on it differs from its model; `seed` is that of the sensors' noise.
@@ -111,11 +127,35 @@ impl Spacecraft {
     /// Integrates one tick under a torque command [N m], saturated as the wheels do it.
     #[inline]
     pub fn advance(&mut self, command: &Vector3<f64>) {
-        self.torque_applied = self.plant.saturate(command, &self.body.wheel_speed);
-        self.plant.step(&mut self.body, &self.torque_applied);
+        self.advance_doing(command, Activity::default());
+    }
+
+    /// The same, while imager, transmitter and thrusters do something.
+    #[inline]
+    pub fn advance_doing(&mut self, command: &Vector3<f64>, activity: Activity) {
+        if self.onboard.is_some() {
+            self.live(command, activity);
+        } else {
+            self.torque_applied = self.plant.saturate(command, &self.body.wheel_speed);
+            self.plant.step(&mut self.body, &self.torque_applied);
+        }
         self.now = self.now.after(1);
         if let Some(measured) = &mut self.measured {
             measured.body = measured.sensor.measure(&self.body);
         }
+    }
+
+    /// A tick with torques from outside, and its books.
+    #[inline]
+    fn live(&mut self, command: &Vector3<f64>, activity: Activity) {
+        let Some(onboard) = &mut self.onboard else { return };
+        let then = self.now.after(1);
+        let positions_N = [self.orbit.position(self.now), self.orbit.position(then)];
+        let plant = &self.plant;
+        let (external, feed_forward) = onboard.torques(self.now, &positions_N, &self.body, plant, activity);
+        self.torque_applied = plant.saturate(&(command + feed_forward), &self.body.wheel_speed);
+        let torque = &self.torque_applied;
+        plant.step_under(&mut self.body, torque, |stage, _| external[stage.index()]);
+        onboard.book(then, &positions_N[1], &self.body, plant, torque, activity);
     }
 }

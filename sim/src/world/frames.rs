@@ -41,7 +41,7 @@ const SCAN_EPSILON: f64 = 1e-9;
 ///
 /// z is the line of sight; y = unit(LOS × v⊥) is the cross-track axis; x = y × z. Eqs 2-10 reach this attitude in two
 /// rotations from the body's present one, but the result does not depend on where they start
-/// (`tests/val_paper_construction.rs` shows it).
+/// (`tests/it/val_paper_construction.rs` shows it).
 #[inline]
 #[must_use]
 pub fn reference_dcm(r_BN_N: &Vector3<f64>, r_target_N: &Vector3<f64>, scan_N: &Vector3<f64>) -> Matrix3<f64> {

@@ -6,12 +6,26 @@ use serde::{Deserialize, Serialize};
 use crate::config::RequestLimits;
 use crate::error::StripError;
 use crate::time::TickPeriod;
-use crate::world::frames::direction_E;
+use crate::world::frames::{direction_E, earth_to_inertial};
 
 /// Identity of a strip within a mission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct StripId(pub u64);
+
+impl StripId {
+    /// The identity of the strip at an index, from 0: identities begin at 1.
+    #[must_use]
+    pub fn from_index(index: usize) -> Self {
+        Self(index as u64 + 1)
+    }
+
+    /// Index of the strip among all, from 0; none for 0, which is no identity.
+    #[must_use]
+    pub fn index(self) -> Option<usize> {
+        usize::try_from(self.0.checked_sub(1)?).ok()
+    }
+}
 
 /// What a request asks for: the paper's (r_start, r_end, p, v_acq) in an operator's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,8 +63,6 @@ pub struct Strip {
     pub priority: f64,
 }
 
-/// Ends of twins differ by no more than rounding [rad].
-const TWIN_TOLERANCE: f64 = 1e-9;
 /// Strips whose ends are this close to opposite have no defined great circle [rad].
 const ANTIPODAL_MARGIN: f64 = 1e-6;
 
@@ -143,14 +155,6 @@ impl StripRequest {
 }
 
 impl Strip {
-    /// Whether this is the other strip scanned backward, as bidirectional requests make them.
-    #[must_use]
-    pub fn is_twin_of(&self, other: &Self) -> bool {
-        let end_E = |strip: &Self| strip.start_E * libm::cos(strip.arc) + strip.along_E * libm::sin(strip.arc);
-        let same = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm_squared() < TWIN_TOLERANCE * TWIN_TOLERANCE;
-        same(self.start_E, end_E(other)) && same(end_E(self), other.start_E)
-    }
-
     /// Time T_acq to image the strip [s].
     #[must_use]
     pub fn acquisition_time_s(&self) -> f64 {
@@ -170,6 +174,15 @@ impl Strip {
     pub fn target_E(&self, elapsed: f64) -> (Vector3<f64>, Vector3<f64>) {
         let (s, c) = libm::sincos(self.angular_speed * elapsed);
         (self.start_E * c + self.along_E * s, self.along_E * c - self.start_E * s)
+    }
+
+    /// Position of the target on a sphere of `radius` [m] and unit vector of its scan direction in N, as
+    /// [`target_E`](Self::target_E), when cosine and sine of the Earth's rotation angle are `earth`.
+    #[inline]
+    #[must_use]
+    pub fn target_N(&self, elapsed: f64, earth: (f64, f64), radius: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let (target_E, scan_E) = self.target_E(elapsed);
+        (earth_to_inertial(earth, &target_E) * radius, earth_to_inertial(earth, &scan_E))
     }
 
     /// Unit vector to the strip's end in E.
@@ -213,37 +226,38 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_has_its_own_reason() {
+    fn each_fault_has_its_own_error() {
         let limits = RequestLimits::default();
-        let code = |change: fn(&mut StripRequest)| {
+        let error = |change: fn(&mut StripRequest)| {
             let mut request = request();
             change(&mut request);
-            request.to_strip(&limits, RADIUS).unwrap_err().code()
+            request.to_strip(&limits, RADIUS).unwrap_err()
         };
-        assert_eq!(code(|r| r.priority = f64::NAN), 100);
-        assert_eq!(code(|r| r.start_latitude_deg = 91.0), 101);
-        assert_eq!(code(|r| r.end_longitude_deg = -181.0), 102);
-        assert_eq!(code(|r| r.priority = 1.5), 103);
-        assert_eq!(code(|r| r.acquisition_speed_m_s = 100.0), 104);
-        assert_eq!(code(|r| r.end_latitude_deg = 60.0), 105);
-        assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (-10.0, 200.0)), 111);
-        assert_eq!(code(|r| (r.end_latitude_deg, r.end_longitude_deg) = (10.0, 20.0)), 105);
+        assert!(matches!(error(|r| r.priority = f64::NAN), StripError::NotFinite { field: "priority", .. }));
+        assert!(matches!(error(|r| r.start_latitude_deg = 91.0), StripError::Latitude { value_deg: 91.0, .. }));
+        assert!(matches!(error(|r| r.end_longitude_deg = -181.0), StripError::Longitude { value_deg: -181.0, .. }));
+        assert!(matches!(error(|r| r.priority = 1.5), StripError::Priority { priority: 1.5 }));
+        assert!(matches!(error(|r| r.acquisition_speed_m_s = 100.0), StripError::Speed { speed_m_s: 100.0, .. }));
+        assert!(matches!(error(|r| r.end_latitude_deg = 60.0), StripError::Length { .. }));
+        let opposite = error(|r| (r.end_latitude_deg, r.end_longitude_deg) = (-10.0, 200.0));
+        assert_eq!(opposite, StripError::Antipodal);
+        let point = error(|r| (r.end_latitude_deg, r.end_longitude_deg) = (10.0, 20.0));
+        assert!(matches!(point, StripError::Length { length_km: 0.0, .. }));
     }
 
     #[test]
-    fn a_reversed_strip_is_a_twin_and_no_other_is() {
+    fn a_reversed_strip_ends_where_the_strip_starts() {
         let limits = RequestLimits::default();
-        let request = StripRequest {
-            start_latitude_deg: 10.0,
-            start_longitude_deg: 20.0,
-            end_latitude_deg: 11.0,
-            end_longitude_deg: 22.0,
-            acquisition_speed_m_s: 3000.0,
-            priority: 0.5,
-            bidirectional: true,
-        };
-        let strip = request.to_strip(&limits, 6_378_136.6).unwrap();
-        let twin = request.reversed().to_strip(&limits, 6_378_136.6).unwrap();
-        assert!(strip.is_twin_of(&twin) && twin.is_twin_of(&strip) && !strip.is_twin_of(&strip));
+        let (request, reversed) = (request(), request().reversed());
+        let strip = request.to_strip(&limits, RADIUS).unwrap();
+        let twin = reversed.to_strip(&limits, RADIUS).unwrap();
+        assert_relative_eq!(strip.start_E, twin.end_E(), epsilon = 1e-9);
+        assert_relative_eq!(strip.end_E(), twin.start_E, epsilon = 1e-9);
+        assert!((strip.start_E - twin.start_E).norm() > 1e-9);
+    }
+
+    #[test]
+    fn identities_begin_at_one() {
+        assert_eq!((StripId::from_index(0), StripId(1).index(), StripId(0).index()), (StripId(1), Some(0), None));
     }
 }

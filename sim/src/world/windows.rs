@@ -53,6 +53,17 @@ pub struct WindowFinder {
     period: TickPeriod,
 }
 
+/// A pass of the satellite over a ground point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pass {
+    /// When the point's limit is crossed coming [s since the epoch].
+    pub rise_s: f64,
+    /// When it is crossed going [s since the epoch].
+    pub set_s: f64,
+    /// Cosine of the least central angle.
+    pub cos_greatest: f64,
+}
+
 /// g and its first two derivatives in time.
 struct Visibility {
     g: f64,
@@ -67,6 +78,13 @@ impl WindowFinder {
         let elevation = config.imaging.elevation_min_deg.to_radians();
         let ratio = config.earth.radius_m / orbit.radius;
         let limit = libm::acos(ratio * libm::cos(elevation)) - elevation;
+        Self::with_limit(config, orbit, period, libm::cos(limit))
+    }
+
+    /// A finder of passes up to a central angle between a ground point and the satellite, given as its cosine.
+    #[must_use]
+    pub(crate) fn with_limit(config: &SimConfig, orbit: &Orbit, period: TickPeriod, cos_limit: f64) -> Self {
+        let ratio = config.earth.radius_m / orbit.radius;
         Self {
             node_N: orbit.node_N,
             ahead_N: orbit.ahead_N,
@@ -74,7 +92,7 @@ impl WindowFinder {
             mean_motion: orbit.mean_motion,
             earth_at_epoch: config.earth.angle_at_epoch_deg.to_radians(),
             earth_rate: config.earth.rotation_rad_s,
-            cos_limit: libm::cos(limit),
+            cos_limit,
             ratio,
             period,
         }
@@ -94,6 +112,21 @@ impl WindowFinder {
                 }
             }
             culmination = self.nearest_culmination(&strip.start_E, culmination + revolution);
+        }
+    }
+
+    /// Passes over a ground point that end after `from_s` and begin before `to_s` [s], in order.
+    pub(crate) fn passes(&self, point_E: &Vector3<f64>, from_s: f64, to_s: f64, mut each: impl FnMut(Pass)) {
+        let revolution = std::f64::consts::TAU / self.mean_motion;
+        let mut culmination = self.nearest_culmination(point_E, from_s - PASS_MARGIN_S);
+        while culmination < to_s + PASS_MARGIN_S {
+            if let Some(pass) = self.pass(point_E, culmination)
+                && pass.set_s > from_s
+                && pass.rise_s < to_s
+            {
+                each(pass);
+            }
+            culmination = self.nearest_culmination(point_E, culmination + revolution);
         }
     }
 
@@ -123,13 +156,13 @@ impl WindowFinder {
 
     /// Times [s] between which imaging can start in the pass that culminates over the strip's start near `culmination`.
     fn window_around(&self, strip: &Strip, duration: f64, culmination: f64) -> Option<(f64, f64)> {
-        let (mut open, mut close) = self.pass(&strip.start_E, culmination)?;
+        let Pass { rise_s: mut open, set_s: mut close, .. } = self.pass(&strip.start_E, culmination)?;
         let pieces = (duration / CHECKPOINT_SPACING_S).ceil() as u32;
         for piece in 1..=pieces {
             let elapsed = (f64::from(piece) * CHECKPOINT_SPACING_S).min(duration);
-            let (rise, set) = self.pass(&strip.target_E(elapsed).0, culmination)?;
-            open = open.max(rise - elapsed);
-            close = close.min(set - elapsed);
+            let pass = self.pass(&strip.target_E(elapsed).0, culmination)?;
+            open = open.max(pass.rise_s - elapsed);
+            close = close.min(pass.set_s - elapsed);
             if open > close {
                 return None;
             }
@@ -137,8 +170,8 @@ impl WindowFinder {
         (open <= close).then_some((open, close))
     }
 
-    /// Rise and set [s] of the satellite over a point, in the pass that culminates near `guess`.
-    fn pass(&self, point_E: &Vector3<f64>, guess: f64) -> Option<(f64, f64)> {
+    /// The satellite's pass over a point that culminates near `guess` [s].
+    fn pass(&self, point_E: &Vector3<f64>, guess: f64) -> Option<Pass> {
         let mut t = guess;
         let mut at = self.visibility(point_E, t);
         for _ in 0..6 {
@@ -159,7 +192,8 @@ impl WindowFinder {
         // g ≈ g_max·cos(w·(t-t_max)) with w² = -g''/g.
         let rate = (-at.g_ddot / at.g).sqrt();
         let half = libm::acos(self.cos_limit / at.g) / rate;
-        Some((self.crossing(point_E, t - half), self.crossing(point_E, t + half)))
+        let (rise_s, set_s) = (self.crossing(point_E, t - half), self.crossing(point_E, t + half));
+        Some(Pass { rise_s, set_s, cos_greatest: at.g })
     }
 
     /// Root of g - cos λ near `guess`, by Newton's method.

@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
 use swath_bags::cli::{MANIFEST, MANIFEST_TEXT};
+use swath_bags::schema::{Schema, adapt};
 use swath_bags::{Bag, Filter, TopicPattern};
 use swath_msgs::RosMessage;
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::{request_of_strip, task_record};
+use swath_node::messages::task_record;
 use swath_ros::{Cdr, decode, graph};
 use swath_sim::model::Model;
 use swath_sim::task::SettledTask;
@@ -18,10 +19,10 @@ use swath_sim::world::strip::StripId;
 
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::action::{Act, Action};
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::order::Order;
 use swath_mission::outcome::TaskLine;
 use swath_mission::task_log::TaskLog;
-use swath_node::orders::action;
+use swath_node::orders::{action, request_of_strip};
 
 /// The namespace in which a mission's nodes run unless they are told otherwise.
 pub const NAMESPACE: &str = "/swath";
@@ -105,11 +106,15 @@ impl Recorded {
         let Some(recorded) = recorded else { bail!("the bag has no topic {name}: is --namespace right?") };
         let type_name = &recorded.topic.type_name;
         ensure!(type_name == M::TYPE_NAME, "topic {name} is of type {type_name}, not {}", M::TYPE_NAME);
+        // What an earlier version recorded is read by what the recording says of its types.
+        let own = Schema::parse(M::TYPE_NAME, M::SCHEMA)?;
+        let then = Schema::of(&recorded.topic)?;
         let topics = TopicPattern::new(std::slice::from_ref(&name), None, None)?;
         let mut messages = self.bag.messages(&Filter { topics, ..Filter::default() })?;
         while let Some(message) = messages.next()? {
             let time = message.log_time;
-            let read = decode(&Cdr::from_bytes(message.data.to_vec()));
+            let data = if then == own { message.data.to_vec() } else { adapt(&then, &own, &message.data)? };
+            let read = decode(&Cdr::from_bytes(data));
             each(read.with_context(|| format!("{name} at {time} ns"))?)?;
         }
         Ok(())
@@ -208,13 +213,13 @@ impl Recorded {
             request.bidirectional = bidirectional;
             let (client_ref, name) = (event.client_ref.clone(), event.strip.name.clone());
             let submitter = event.submitter.clone();
-            let named = NamedRequest { submitter, ..NamedRequest::new(client_ref, name, request) };
+            let order = Order { submitter, ..Order::new(client_ref, name, request) };
             arrivals.push(Action {
                 at: Tick(event.tick),
                 initial: id <= known,
                 actor: event.submitter.clone(),
                 reason: String::new(),
-                act: Act::Submit(StripId(id), Box::new(named)),
+                act: Act::Submit(StripId(id), Box::new(order)),
             });
         }
         Ok(arrivals)

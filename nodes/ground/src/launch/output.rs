@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::geojson;
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
 
 /// Where bag, tasks and summary go.
@@ -40,7 +40,7 @@ impl OutputFolder {
     }
 
     /// Writes the mission as it is flown: `mission.toml`, and all its requests in `requests.geojson` beside it.
-    pub fn write_mission(&self, mission: &Mission, requests: &[NamedRequest]) -> Result<PathBuf> {
+    pub fn write_mission(&self, mission: &Mission, requests: &[Order]) -> Result<PathBuf> {
         geojson::write(&self.path.join("requests.geojson"), requests)?;
         let files = vec![PathBuf::from("requests.geojson")];
         let mission = Mission {

@@ -7,14 +7,17 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::Value;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
+use swath_sim::world::strip::StripId;
 
 use super::client::{Operator, check};
-use super::show::{history_json, state_name, status_json};
+use crate::requests::json::{exported, history_json};
+use crate::requests::messages::{history_entry, stored_status};
 use crate::requests::store::Store;
-use swath_mission::orders::geojson::feature_of;
+use swath_mission::orders::order::Order;
+use swath_node::orders::order_of;
 
 /// `swath strips export`.
 #[derive(Debug, Args)]
@@ -31,12 +34,12 @@ pub struct ExportArgs {
 }
 
 /// Entries in one page: with Fast DDS a longer answer than 64 kB would not arrive.
-const PAGE: u32 = 100;
+const PAGE: u32 = 50;
 
-/// What is exported: features, and the audit trail.
+/// What is exported: orders and where they stand, and the audit trail.
 struct Everything {
-    features: Vec<Value>,
-    trail: Vec<Value>,
+    requests: Vec<(Order, msg::StripStatus)>,
+    trail: Vec<msg::HistoryEntry>,
 }
 
 /// Exports strips or the audit trail.
@@ -58,22 +61,21 @@ pub fn export(args: &ExportArgs) -> Result<()> {
 }
 
 fn write(everything: Everything, trail: bool, mut to: impl Write) -> Result<()> {
-    let Everything { mut features, trail: lines } = everything;
+    let lines = everything.trail.iter().map(history_json);
     if trail {
-        for line in &lines {
+        for line in lines {
             writeln!(to, "{line}")?;
         }
         return Ok(to.flush()?);
     }
     let mut histories: BTreeMap<u64, Vec<Value>> = BTreeMap::new();
-    for line in lines {
-        histories.entry(line["strip"].as_u64().unwrap_or(0)).or_default().push(line);
+    for (line, entry) in lines.zip(&everything.trail) {
+        histories.entry(entry.strip_id).or_default().push(line);
     }
     writeln!(to, "{{\"type\":\"FeatureCollection\",\"features\":[")?;
-    let count = features.len();
-    for (i, feature) in features.iter_mut().enumerate() {
-        let id = feature["properties"]["id"].as_u64().unwrap_or(0);
-        feature["properties"]["history"] = histories.remove(&id).unwrap_or_default().into();
+    let count = everything.requests.len();
+    for (i, (order, status)) in everything.requests.iter().enumerate() {
+        let feature = exported(order, status, histories.remove(&status.strip.id).unwrap_or_default());
         writeln!(to, "{feature}{}", if i + 1 < count { "," } else { "" })?;
     }
     writeln!(to, "]}}")?;
@@ -83,20 +85,13 @@ fn write(everything: Everything, trail: bool, mut to: impl Write) -> Result<()> 
 fn from_mission() -> Result<Everything> {
     let operator = Operator::start()?;
     let desk = operator.desk(&graph::LIST_STRIPS)?;
-    let mut features = Vec::new();
-    let mut call = msg::ListStripsRequest { limit: PAGE, ..Default::default() };
+    let mut requests = Vec::new();
+    let mut call = msg::ListStripsRequest { limit: PAGE, with_requests: true, ..Default::default() };
     loop {
         let page = desk.call(call.clone())?;
         check(page.reason_code, &page.reason)?;
-        features.extend(page.strips.iter().map(|status| {
-            let mut properties = status_json(status);
-            let coordinates = json!([properties["start"].take(), properties["end"].take()]);
-            json!({
-                "type": "Feature", "properties": properties,
-                "geometry": { "type": "LineString", "coordinates": coordinates },
-            })
-        }));
         call.after_id = page.strips.last().map_or(call.after_id, |status| status.strip.id);
+        requests.extend(page.requests.iter().map(order_of).zip(page.strips));
         if !page.more {
             break;
         }
@@ -107,40 +102,29 @@ fn from_mission() -> Result<Everything> {
     loop {
         let page = desk.call(call)?;
         check(page.reason_code, &page.reason)?;
-        trail.extend(page.entries.iter().map(history_json));
         call.after_sequence = page.entries.last().map_or(call.after_sequence, |entry| entry.sequence);
+        trail.extend(page.entries);
         if !page.more {
-            return Ok(Everything { features, trail });
+            return Ok(Everything { requests, trail });
         }
     }
 }
 
 fn from_store(store: &Store) -> Result<Everything> {
-    let features = (1_u64..).zip(store.snapshot()?.requests).map(|(id, stored)| {
-        let request = stored.request;
-        let mut feature = feature_of(&request.named);
-        let properties = &mut feature["properties"];
-        properties["id"] = id.into();
-        properties["state"] = request.state.name().into();
-        properties["reason_code"] = request.reason.0.into();
-        properties["reason"] = request.reason.1.into();
-        properties["attempts"] = request.standing.attempts.into();
-        properties["reward"] = request.standing.reward.into();
-        feature
+    let snapshot = store.snapshot()?;
+    let stamper = store.stamper()?;
+    let stored = (1..).map(StripId).zip(snapshot.requests);
+    let requests = stored.map(|(id, stored)| {
+        let status = stored_status(&stamper, snapshot.progress.now, id, &stored);
+        (stored.request.order, status)
     });
-    let features = features.collect();
-    let mut trail = Vec::new();
-    let mut after = 0;
+    let requests = requests.collect();
+    let mut trail: Vec<msg::HistoryEntry> = Vec::new();
     loop {
-        let lines = store.trail(after, PAGE as usize)?;
-        let Some(last) = lines.last() else { return Ok(Everything { features, trail }) };
-        after = last.sequence;
-        trail.extend(lines.iter().map(|line| {
-            json!({
-                "sequence": line.sequence, "strip": line.id.0, "client_ref": line.client_ref, "name": line.name,
-                "tick": line.tick.0, "state": state_name(line.state.number()), "reason_code": line.reason.0,
-                "reason": line.reason.1, "actor": line.actor,
-            })
-        }));
+        let lines = store.trail(trail.last().map_or(0, |entry| entry.sequence), PAGE as usize)?;
+        if lines.is_empty() {
+            return Ok(Everything { requests, trail });
+        }
+        trail.extend(lines.iter().map(|line| history_entry(&stamper, line)));
     }
 }

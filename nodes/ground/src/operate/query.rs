@@ -12,14 +12,13 @@ use swath_sim::config::SimConfig;
 
 use super::client::{Operator, check};
 use super::read_files;
-use super::show::{
-    opportunity_json, opportunity_table, report_json, report_text, status_head, status_json, status_line,
-};
+use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
+use crate::requests::json::status_json;
 use swath_mission::orders::geojson::Lengths;
 use swath_mission::requests::index::Area;
 use swath_mission::requests::lifecycle::State;
 use swath_mission::time_text;
-use swath_node::orders::strip_request;
+use swath_node::orders::request_message;
 
 /// `swath strips preview`.
 #[derive(Debug, Args)]
@@ -109,7 +108,9 @@ pub fn preview(args: &PreviewArgs) -> Result<()> {
     let mut calls: Vec<_> = import
         .requests
         .iter()
-        .map(|named| (named.name.clone(), msg::PreviewStripRequest { id: 0, request: strip_request(named), horizon_s }))
+        .map(|named| {
+            (named.name.clone(), msg::PreviewStripRequest { id: 0, request: request_message(named), horizon_s })
+        })
         .collect();
     if let Some(id) = args.id {
         let call = msg::PreviewStripRequest { id, horizon_s, ..Default::default() };
@@ -164,6 +165,7 @@ pub fn list(args: &ListArgs) -> Result<()> {
         opportunity_until: at(args.until),
         after_id: args.after,
         limit: if args.limit == 0 { 100 } else { args.limit },
+        with_requests: false,
     };
     if !args.json {
         println!("{}", status_head());

@@ -12,7 +12,7 @@ use super::client::{Operator, check};
 use super::show::print_result;
 use super::{Actor, read_files};
 use swath_mission::orders::geojson::Lengths;
-use swath_node::orders::strip_request;
+use swath_node::orders::request_message;
 
 /// Requests in one call.
 const BATCH: usize = 500;
@@ -93,7 +93,7 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
         let operator = Operator::start()?;
         let desk = operator.desk(&graph::SUBMIT_STRIPS)?;
         for batch in import.requests.chunks(BATCH) {
-            let requests = batch.iter().map(strip_request).collect::<Vec<_>>();
+            let requests = batch.iter().map(request_message).collect::<Vec<_>>();
             let answer = desk.call(msg::SubmitStripsRequest { requests })?;
             check(answer.reason_code, &answer.reason)?;
             for (named, result) in batch.iter().zip(&answer.results) {
@@ -176,7 +176,7 @@ pub fn replace(args: &ReplaceArgs) -> Result<()> {
     let [named] = &import.requests[..] else {
         bail!("{} holds {} strips: one is needed to replace one", args.file.display(), import.requests.len());
     };
-    let request = msg::StripRequest { submitter: args.submitter.clone(), ..strip_request(named) };
+    let request = msg::StripRequest { submitter: args.submitter.clone(), ..request_message(named) };
     let operator = Operator::start()?;
     let call = msg::ReplaceStripRequest { id: args.id, request };
     let result = operator.desk(&graph::REPLACE_STRIP)?.call(call)?.result;

@@ -10,7 +10,8 @@ use swath_msgs::swath_msgs as msg;
 use swath_ros::{Shutdown, graph};
 
 use super::client::Operator;
-use super::show::{state_name, status_head, status_json, status_line, time};
+use super::show::{status_head, status_line};
+use crate::requests::json::{state_name, status_json, time};
 
 /// `swath strips watch`.
 #[derive(Debug, Args)]

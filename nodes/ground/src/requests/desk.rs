@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use anyhow::Result;
 use swath_msgs::RosService;
 use swath_msgs::swath_msgs as msg;
-use swath_node::orders::named_request;
-use swath_node::orders::strip_request;
+use swath_node::orders::order_of;
+use swath_node::orders::request_message;
 use swath_ros::{Node, RequestId, RosError, Server, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
@@ -86,7 +86,7 @@ impl Desk {
             outgoing.push(Outgoing::Cancelled(id, msg::CancelStripsResponse { results, reason_code, reason }));
         }
         while let Some((id, call)) = next(&self.replace)? {
-            let result = messages::submit_result(logic.replace(StripId(call.id), named_request(&call.request)));
+            let result = messages::submit_result(logic.replace(StripId(call.id), order_of(&call.request), logic.now()));
             outgoing.push(Outgoing::Replaced(id, msg::ReplaceStripResponse { result }));
         }
         while let Some((id, call)) = next(&self.review)? {
@@ -119,8 +119,8 @@ impl Desk {
             && let Some(job) = self.jobs.front_mut()
         {
             let taken = job.requests.by_ref().take(left);
-            let before = job.results.len();
-            job.results.extend(taken.map(|request| messages::submit_result(logic.submit(named_request(&request)))));
+            let (before, now) = (job.results.len(), logic.now());
+            job.results.extend(taken.map(|request| messages::submit_result(logic.submit(order_of(&request), now))));
             left -= job.results.len() - before;
             if job.requests.len() == 0
                 && let Some(Job { id, results, .. }) = self.jobs.pop_front()
@@ -174,7 +174,10 @@ fn list(logic: &RequestLogic, base: &MissionNode, call: &msg::ListStripsRequest)
         Ok(page) => {
             let status = |&id: &StripId| Some(messages::strip_status(&base.stamper, logic, id, logic.request(id)?));
             let strips = page.ids.iter().filter_map(status).collect::<Vec<_>>();
-            msg::ListStripsResponse { strips, more: page.more, ..Default::default() }
+            let wanted = page.ids.iter().filter(|_| call.with_requests);
+            let requests = wanted.filter_map(|&id| Some(request_message(&logic.request(id)?.order)));
+            let requests = requests.collect::<Vec<_>>();
+            msg::ListStripsResponse { strips, requests, more: page.more, ..Default::default() }
         }
         Err(refusal) => {
             msg::ListStripsResponse { reason_code: refusal.code(), reason: refusal.to_string(), ..Default::default() }
@@ -184,7 +187,7 @@ fn list(logic: &RequestLogic, base: &MissionNode, call: &msg::ListStripsRequest)
 
 fn preview(logic: &RequestLogic, base: &MissionNode, call: &msg::PreviewStripRequest) -> msg::PreviewStripResponse {
     let found = horizon(logic, base, call.horizon_s).and_then(|until| match call.id {
-        0 => logic.preview(&named_request(&call.request), until),
+        0 => logic.preview(&order_of(&call.request), until),
         id => logic.outlook(StripId(id), until),
     });
     let now = base.stamper.time(logic.now());
@@ -239,7 +242,7 @@ fn get(
     let history = store.history(id)?;
     let report = msg::StripReport {
         status: messages::strip_status(&base.stamper, logic, id, request),
-        request: strip_request(&request.named),
+        request: request_message(&request.order),
         opportunities: outlook.iter().map(|it| messages::opportunity(&base.stamper, it)).collect::<Vec<_>>(),
         attempts,
         history: history.iter().map(|line| messages::history_entry(&base.stamper, line)).collect::<Vec<_>>(),

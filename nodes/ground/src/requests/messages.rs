@@ -1,18 +1,23 @@
 //! Messages about strip requests: values that come in are checked by the request manager, each with its reason.
 
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::action::Review;
+use swath_mission::orders::order::Order;
 use swath_mission::requests::index::Area;
-use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome, failure_reason};
+use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome};
 use swath_mission::requests::lifecycle::State;
-use swath_mission::requests::logic::{Abort, Offer, Request, RequestLogic, Review};
+use swath_mission::requests::logic::{Abort, Offer, RequestLogic};
 use swath_mission::requests::query::{Filter, Opportunity};
+use swath_mission::requests::reason::Reason;
 use swath_mission::requests::refusal::Refusal;
+use swath_mission::requests::request::{Request, Stored};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
+use swath_node::orders::strip;
 use swath_node::stamp::{EARTH_FRAME, Stamper};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
+use swath_sim::world::windows::Window;
 
 use super::store::HistoryLine;
 
@@ -81,28 +86,12 @@ fn area(call: &msg::ListStripsRequest) -> Result<Area, Refusal> {
     Ok(Area { south_deg, north_deg, west_deg: call.west_deg, east_deg: call.east_deg })
 }
 
-/// A strip in a request's own degrees.
-#[must_use]
-pub fn strip(id: u64, named: &NamedRequest) -> msg::Strip {
-    let request = &named.request;
-    msg::Strip {
-        id,
-        name: named.name.clone(),
-        start_latitude_deg: request.start_latitude_deg,
-        start_longitude_deg: request.start_longitude_deg,
-        end_latitude_deg: request.end_latitude_deg,
-        end_longitude_deg: request.end_longitude_deg,
-        priority: request.priority,
-        acquisition_speed: request.acquisition_speed_m_s,
-    }
-}
-
 /// What the planner is offered; `request` gives what was asked for under an identity.
 #[must_use]
 pub fn upcoming_strips<'a>(
     stamper: &Stamper,
     offer: &Offer,
-    request: impl Fn(&Candidate) -> Option<&'a NamedRequest>,
+    request: impl Fn(&Candidate) -> Option<&'a Order>,
 ) -> msg::UpcomingStrips {
     let candidates = offer.candidates.iter().filter_map(|candidate| {
         Some(msg::Candidate {
@@ -110,6 +99,7 @@ pub fn upcoming_strips<'a>(
             window_open_tick: candidate.window.open.0,
             window_close_tick: candidate.window.close.0,
             t_acq_ticks: candidate.t_acq,
+            twin: number(candidate.twin),
         })
     });
     msg::UpcomingStrips {
@@ -126,17 +116,33 @@ pub fn upcoming_strips<'a>(
 #[must_use]
 pub fn strip_status(stamper: &Stamper, logic: &RequestLogic, id: StripId, request: &Request) -> msg::StripStatus {
     let listed = logic.strip(id);
-    let window = listed
-        .filter(|_| !request.state.is_final())
-        .and_then(|listed| listed.windows_after(logic.now()).first().copied());
+    let windows = listed.map_or(&[][..], |listed| listed.windows_after(logic.now()));
+    status(stamper, id, request, windows.first(), listed.and_then(|listed| listed.linked))
+}
+
+/// Where a request of a store stands.
+#[must_use]
+pub fn stored_status(stamper: &Stamper, now: Tick, id: StripId, stored: &Stored) -> msg::StripStatus {
+    let window = stored.windows.iter().find(|window| window.close > now);
+    status(stamper, id, &stored.request, window, stored.linked)
+}
+
+fn status(
+    stamper: &Stamper,
+    id: StripId,
+    request: &Request,
+    window: Option<&Window>,
+    linked: Option<StripId>,
+) -> msg::StripStatus {
+    let window = window.filter(|_| !request.state.is_final());
     let standing = &request.standing;
     msg::StripStatus {
         header: stamper.header(request.changed, EARTH_FRAME),
-        strip: strip(id.0, &request.named),
-        client_ref: request.named.client_ref.clone(),
-        submitter: request.named.submitter.clone(),
+        strip: strip(id.0, &request.order),
+        client_ref: request.order.client_ref.clone(),
+        submitter: request.order.submitter.clone(),
         state: request.state.number(),
-        reason_code: request.reason.0,
+        reason_code: request.reason.0.number(),
         reason: request.reason.1.clone(),
         actor: request.actor.clone(),
         tick: request.changed.0,
@@ -146,7 +152,7 @@ pub fn strip_status(stamper: &Stamper, logic: &RequestLogic, id: StripId, reques
         window_open: window.map_or_else(Time::default, |window| stamper.time(window.open)),
         window_close: window.map_or_else(Time::default, |window| stamper.time(window.close)),
         imaging: time_unless_zero(stamper, standing.imaging),
-        linked_to: number(listed.and_then(|listed| listed.linked)),
+        linked_to: number(linked),
         supersedes: number(request.supersedes),
         superseded_by: number(standing.superseded_by),
     }
@@ -157,10 +163,10 @@ pub fn strip_status(stamper: &Stamper, logic: &RequestLogic, id: StripId, reques
 pub fn change(stamper: &Stamper, logic: &RequestLogic, change: &Change) -> msg::StripStatus {
     let known = logic.request(change.id).map(|request| strip_status(stamper, logic, change.id, request));
     let status = known.unwrap_or_else(|| {
-        change.refused.as_ref().map_or_else(msg::StripStatus::default, |named| msg::StripStatus {
-            strip: strip(0, named),
-            client_ref: named.client_ref.clone(),
-            submitter: named.submitter.clone(),
+        change.refused.as_ref().map_or_else(msg::StripStatus::default, |order| msg::StripStatus {
+            strip: strip(0, order),
+            client_ref: order.client_ref.clone(),
+            submitter: order.submitter.clone(),
             created_tick: change.tick.0,
             ..msg::StripStatus::default()
         })
@@ -168,7 +174,7 @@ pub fn change(stamper: &Stamper, logic: &RequestLogic, change: &Change) -> msg::
     msg::StripStatus {
         header: stamper.header(change.tick, EARTH_FRAME),
         state: change.state.number(),
-        reason_code: change.reason.0,
+        reason_code: change.reason.0.number(),
         reason: change.reason.1.clone(),
         actor: change.actor.clone(),
         tick: change.tick.0,
@@ -247,7 +253,7 @@ pub fn attempt(attempt: &Attempt) -> msg::Attempt {
     let (state, reason_code) = match attempt.outcome {
         Outcome::Succeeded => (msg::Attempt::STATE_SUCCEEDED, 0),
         Outcome::Cancelled => (msg::Attempt::STATE_CANCELLED, 0),
-        Outcome::Failed(failure) => (msg::Attempt::STATE_FAILED, failure_reason(failure).0),
+        Outcome::Failed(failure) => (msg::Attempt::STATE_FAILED, Reason::from(failure).number()),
     };
     msg::Attempt {
         strip_id: attempt.id.0,

@@ -1,8 +1,10 @@
 //! The request manager's node: its topics, its services, and the store that keeps what was acknowledged.
 
 mod desk;
+pub mod json;
 pub mod messages;
 mod outgoing;
+mod rows;
 pub mod store;
 pub mod wiring;
 pub mod writer;

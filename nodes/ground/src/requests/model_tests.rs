@@ -11,10 +11,11 @@ use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::{StripId, StripRequest};
 
 use super::store::{Durability, Store};
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::action::Review;
+use swath_mission::orders::order::Order;
 use swath_mission::requests::journal::InFlight;
 use swath_mission::requests::lifecycle::State;
-use swath_mission::requests::logic::{RequestLogic, Review, Rules};
+use swath_mission::requests::logic::{RequestLogic, Rules};
 
 const MAX_ATTEMPTS: u32 = 2;
 
@@ -57,7 +58,7 @@ fn operations() -> impl Strategy<Value = Vec<Operation>> {
     )
 }
 
-fn named(reference: u8, place: u8, hold: bool) -> NamedRequest {
+fn order(reference: u8, place: u8, hold: bool) -> Order {
     let longitude_deg = f64::from(place) * 7.0;
     let request = StripRequest {
         start_latitude_deg: 5.0,
@@ -69,7 +70,7 @@ fn named(reference: u8, place: u8, hold: bool) -> NamedRequest {
         bidirectional: false,
     };
     let text = format!("r{reference}");
-    NamedRequest { hold_for_approval: hold, ..NamedRequest::new(text.clone(), text, request) }
+    Order { hold_for_approval: hold, ..Order::new(text.clone(), text, request) }
 }
 
 /// One request of the model.
@@ -176,7 +177,7 @@ impl Trial {
         match *operation {
             Operation::Submit { reference, place, hold } => {
                 let expected = self.simple.submit(reference, place, hold, None);
-                let given = self.logic.submit(named(reference, place, hold));
+                let given = self.logic.submit(order(reference, place, hold), self.logic.now());
                 assert_eq!(given.ok().map(|id| id.0 as usize - 1), expected);
             }
             Operation::Cancel(i) => {
@@ -197,7 +198,7 @@ impl Trial {
                 } else {
                     None
                 };
-                let given = self.logic.replace(id(i), named(reference, place, false));
+                let given = self.logic.replace(id(i), order(reference, place, false), self.logic.now());
                 assert_eq!(given.ok().map(|id| id.0 as usize - 1), expected);
                 if let Some(new) = expected.filter(|_| again.is_none()) {
                     self.simple.requests[old].state = State::Superseded;

@@ -11,10 +11,11 @@ use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::StripId;
 
 use super::store::{Durability, Store, StoreError};
-use swath_mission::orders::geojson::NamedRequest;
+use swath_mission::orders::action::Review;
+use swath_mission::orders::order::Order;
 use swath_mission::requests::journal::{InFlight, Outcome};
 use swath_mission::requests::lifecycle::State;
-use swath_mission::requests::logic::{RequestLogic, Review, Rules};
+use swath_mission::requests::logic::{RequestLogic, Rules};
 
 fn empty() -> RequestLogic {
     let model = Model::new(SimConfig::default()).unwrap();
@@ -22,10 +23,10 @@ fn empty() -> RequestLogic {
     RequestLogic::new(model, &initial, Tick(172_800), Rules { epoch_ns: 0, max_attempts: 10 })
 }
 
-fn requests(count: usize) -> Vec<NamedRequest> {
+fn requests(count: usize) -> Vec<Order> {
     let scenario = ScenarioConfig::default();
     let random = scenario.generate(&mut rng::stream(3, rng::CATALOGUE), count, 6_378_136.6);
-    (1..).zip(random).map(|(i, request)| NamedRequest::new(format!("r{i}"), format!("strip {i}"), request)).collect()
+    (1..).zip(random).map(|(i, request)| Order::new(format!("r{i}"), format!("strip {i}"), request)).collect()
 }
 
 fn write(store: &mut Store, logic: &mut RequestLogic) {
@@ -35,11 +36,11 @@ fn write(store: &mut Store, logic: &mut RequestLogic) {
 /// A life with something of everything.
 fn busy(store: &mut Store) -> RequestLogic {
     let mut logic = empty();
-    for (i, mut named) in requests(60).into_iter().enumerate() {
-        named.request.bidirectional = i % 4 == 0;
-        named.hold_for_approval = i % 7 == 0;
-        named.valid_until_ns = if i % 5 == 0 { 80_000_000_000_000 } else { 0 };
-        let _ = logic.submit(named);
+    for (i, mut order) in requests(60).into_iter().enumerate() {
+        order.request.bidirectional = i % 4 == 0;
+        order.hold_for_approval = i % 7 == 0;
+        order.valid_until_ns = if i % 5 == 0 { 80_000_000_000_000 } else { 0 };
+        let _ = logic.submit(order, logic.now());
     }
     write(store, &mut logic);
     let held: Vec<_> =
@@ -49,10 +50,10 @@ fn busy(store: &mut Store) -> RequestLogic {
     let accepted: Vec<_> =
         (1..=logic.len() as u64).map(StripId).filter(|&id| logic.state(id) == Some(State::Accepted)).collect();
     logic.cancel(accepted[1], "ops", "clouds").unwrap();
-    let old = logic.request(accepted[2]).unwrap().named.clone();
+    let old = logic.request(accepted[2]).unwrap().order.clone();
     let mut better = old.clone();
     better.request.priority = 0.99;
-    logic.replace(accepted[2], better).unwrap();
+    logic.replace(accepted[2], better, logic.now()).unwrap();
     let outcome = |failure| TaskOutcome { failure, max_attitude_error: 0.25, min_elevation: 0.5 };
     for (task, id, failure) in [(0, accepted[5], None), (1, accepted[8], Some(FailureReason::Elevation))] {
         let start = Tick(task * 300);
@@ -90,7 +91,8 @@ fn a_request_manager_that_is_restored_is_the_same_one() {
         let now = Tick(task * 900);
         assert_eq!(after.on_decision_point(task, now, &[]), before.on_decision_point(task, now, &[]));
     }
-    assert_eq!(after.submit(requests(1).remove(0)), before.submit(requests(1).remove(0)));
+    let now = after.now();
+    assert_eq!(after.submit(requests(1).remove(0), now), before.submit(requests(1).remove(0), now));
 }
 
 #[test]
@@ -98,11 +100,11 @@ fn the_history_of_a_replacement_begins_with_that_of_the_old_one() {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(&folder.path().join("store.sqlite"), "mission").unwrap();
     let mut logic = empty();
-    let named = requests(1).remove(0);
-    let old = logic.submit(named.clone()).unwrap();
-    let new = logic.replace(old, NamedRequest { name: "better".to_owned(), ..named }).unwrap();
+    let order = requests(1).remove(0);
+    let old = logic.submit(order.clone(), Tick(0)).unwrap();
+    let new = logic.replace(old, Order { name: "better".to_owned(), ..order }, Tick(0)).unwrap();
     logic.cancel(new, "ops", "after all").unwrap();
-    let _ = logic.submit(NamedRequest { name: "x".repeat(300), ..requests(2).remove(1) });
+    let _ = logic.submit(Order { name: "x".repeat(300), ..requests(2).remove(1) }, Tick(0));
     write(&mut store, &mut logic);
     let lines = store.history(new).unwrap();
     let went: Vec<_> = lines.iter().map(|line| (line.id, line.state, line.actor.as_str())).collect();

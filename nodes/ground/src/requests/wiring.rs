@@ -21,7 +21,7 @@ use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
 use swath_node::node::{MissionNode, Severity};
-use swath_node::orders::{named_request, operator_action};
+use swath_node::orders::{operator_action, order_of};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
@@ -139,7 +139,7 @@ impl RequestNode {
             }
         }
         while let Some(request) = self.requests.take()? {
-            if let Err(refusal) = self.logic.submit(named_request(&request)) {
+            if let Err(refusal) = self.logic.submit(order_of(&request), self.logic.now()) {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
@@ -147,6 +147,9 @@ impl RequestNode {
         self.desk.work(&mut self.logic, SLICE, &mut outgoing);
         self.hand_over(outgoing);
         self.tell_aborts()?;
+        for contradiction in self.logic.take_contradictions() {
+            self.base.alarm(Severity::Error, "contradiction", &contradiction.to_string())?;
+        }
         self.release()?;
         self.writer.check()?;
         let wait = if self.desk.is_busy() { Duration::ZERO } else { IDLE };
@@ -179,8 +182,8 @@ impl RequestNode {
         }
         let offer = self.logic.on_decision_point(point.task, now, &results);
         let logic = &self.logic;
-        let named = |id: StripId| logic.request(id).map(|request| &request.named);
-        let message = messages::upcoming_strips(&self.base.stamper, &offer, |candidate| named(candidate.id));
+        let order = |id: StripId| logic.request(id).map(|request| &request.order);
+        let message = messages::upcoming_strips(&self.base.stamper, &offer, |candidate| order(candidate.id));
         self.last = Some(message.clone());
         Ok((!point.mission_over).then_some(message))
     }
@@ -282,7 +285,7 @@ fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
     }
     let requests = base.mission.initial_requests()?;
     let total = requests.len();
-    let accepted = requests.into_iter().filter_map(|request| logic.submit(request).ok()).count();
+    let accepted = requests.into_iter().filter_map(|order| logic.submit(order, Tick(0)).ok()).count();
     tracing::info!("{accepted} of the {total} strips known from the start are accepted");
     Ok(logic)
 }

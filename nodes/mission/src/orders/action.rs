@@ -4,8 +4,7 @@ use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use crate::approval::Mode;
-use crate::orders::geojson::NamedRequest;
-use crate::requests::logic::Review;
+use crate::orders::order::Order;
 
 /// Something that was asked for and taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,17 +21,28 @@ pub struct Action {
     pub act: Act,
 }
 
+/// What an operator decides on a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Review {
+    /// A held request is accepted.
+    Release,
+    /// A held request is refused.
+    Reject,
+    /// An accepted request is held.
+    Hold,
+}
+
 /// What can be asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Act {
     /// A strip, under the number that it got.
-    Submit(StripId, Box<NamedRequest>),
+    Submit(StripId, Box<Order>),
     /// A request is taken back.
     Cancel(StripId),
     /// A request is held, released or rejected.
     Review(StripId, Review),
     /// A request takes the place of another one.
-    Replace(StripId, Box<NamedRequest>),
+    Replace(StripId, Box<Order>),
     /// What the planner may do by itself.
     SetMode(Mode),
     /// A proposal of the planner is approved, or not.

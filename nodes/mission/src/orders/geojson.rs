@@ -11,54 +11,14 @@ use swath_sim::world::frames::direction_E;
 use swath_sim::world::strip::StripRequest;
 use thiserror::Error;
 
+use super::order::{MISSION, Order};
 use crate::time_text;
-
-/// A request with the names that its submitter gave it, and its conditions.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NamedRequest {
-    /// Submitter's own reference; empty without one.
-    pub client_ref: String,
-    /// Who submits.
-    pub submitter: String,
-    /// Name for people.
-    pub name: String,
-    /// What is asked for.
-    pub request: StripRequest,
-    /// Simulated time before which imaging may not start [ns since 1970-01-01 UTC]; 0 for any.
-    pub valid_from_ns: u64,
-    /// Simulated time after which imaging may not end [ns since 1970-01-01 UTC]; 0 for any.
-    pub valid_until_ns: u64,
-    /// Whether it waits for an operator's approval.
-    pub hold_for_approval: bool,
-    /// Attempts before it fails; 0 for the mission's default.
-    pub max_attempts: u32,
-}
-
-/// Submitter of the strips that a mission knows from the start.
-pub const MISSION: &str = "mission";
-
-impl NamedRequest {
-    /// A request of the mission's own, without conditions.
-    #[must_use]
-    pub fn new(client_ref: String, name: String, request: StripRequest) -> Self {
-        Self {
-            client_ref,
-            submitter: MISSION.to_owned(),
-            name,
-            request,
-            valid_from_ns: 0,
-            valid_until_ns: 0,
-            hold_for_approval: false,
-            max_attempts: 0,
-        }
-    }
-}
 
 /// What a file of requests holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Import {
     /// The strips, in the order of the file.
-    pub requests: Vec<NamedRequest>,
+    pub requests: Vec<Order>,
     /// Lines found.
     pub lines: usize,
     /// Lines that were too long for one strip, and how many strips each became.
@@ -182,7 +142,7 @@ pub fn import(path: &Path, lengths: Lengths) -> Result<Import, RequestsFileError
 ///
 /// # Errors
 /// When the file cannot be read, is too large, is no GeoJSON, or holds something that is no strip.
-pub fn read(path: &Path, lengths: Lengths) -> Result<Vec<NamedRequest>, RequestsFileError> {
+pub fn read(path: &Path, lengths: Lengths) -> Result<Vec<Order>, RequestsFileError> {
     let import = import(path, lengths)?;
     match import.refused.into_iter().next() {
         Some((feature, reason)) => Err(RequestsFileError::Feature { path: path.to_owned(), feature, reason }),
@@ -194,27 +154,27 @@ pub fn read(path: &Path, lengths: Lengths) -> Result<Vec<NamedRequest>, Requests
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write(path: &Path, requests: &[NamedRequest]) -> Result<(), RequestsFileError> {
+pub fn write(path: &Path, requests: &[Order]) -> Result<(), RequestsFileError> {
     let unwritable = |source| RequestsFileError::Write { path: path.to_owned(), source };
     let mut file = BufWriter::new(File::create(path).map_err(unwritable)?);
     file.write_all(b"{\"type\":\"FeatureCollection\",\"features\":[").map_err(unwritable)?;
-    for (i, named) in requests.iter().enumerate() {
+    for (i, order) in requests.iter().enumerate() {
         let separator = if i == 0 { "\n" } else { ",\n" };
-        write!(file, "{separator}{}", feature_of(named)).map_err(unwritable)?;
+        write!(file, "{separator}{}", feature_of(order)).map_err(unwritable)?;
     }
     file.write_all(b"\n]}\n").and_then(|()| file.flush()).map_err(unwritable)
 }
 
 /// A request as a GeoJSON feature.
 #[must_use]
-pub fn feature_of(named: &NamedRequest) -> serde_json::Value {
-    let request = &named.request;
+pub fn feature_of(order: &Order) -> serde_json::Value {
+    let request = &order.request;
     let mut feature = serde_json::json!({
         "type": "Feature",
         "properties": {
-            "name": named.name,
-            "client_ref": named.client_ref,
-            "submitter": named.submitter,
+            "name": order.name,
+            "client_ref": order.client_ref,
+            "submitter": order.submitter,
             "priority": request.priority,
             "acquisition_speed_m_s": request.acquisition_speed_m_s,
             "bidirectional": request.bidirectional,
@@ -228,16 +188,16 @@ pub fn feature_of(named: &NamedRequest) -> serde_json::Value {
         },
     });
     let properties = &mut feature["properties"];
-    for (key, ns) in [("valid_from", named.valid_from_ns), ("valid_until", named.valid_until_ns)] {
+    for (key, ns) in [("valid_from", order.valid_from_ns), ("valid_until", order.valid_until_ns)] {
         if ns > 0 {
             properties[key] = time_text::format(ns).into();
         }
     }
-    if named.hold_for_approval {
+    if order.hold_for_approval {
         properties["hold_for_approval"] = true.into();
     }
-    if named.max_attempts > 0 {
-        properties["max_attempts"] = named.max_attempts.into();
+    if order.max_attempts > 0 {
+        properties["max_attempts"] = order.max_attempts.into();
     }
     feature
 }
@@ -265,7 +225,7 @@ fn take_feature(feature: &Feature, fallback: &str, lengths: Lengths, import: &mu
         }
         for (k, (start, end)) in (1..).zip(pieces) {
             let piece = |text: &str| if count > 1 { format!("{text} {k}/{count}") } else { text.to_owned() };
-            requests.push(NamedRequest {
+            requests.push(Order {
                 client_ref: piece(&client_ref),
                 name: piece(&name),
                 request: StripRequest {
@@ -286,7 +246,7 @@ fn take_feature(feature: &Feature, fallback: &str, lengths: Lengths, import: &mu
 }
 
 /// A request with a feature's properties and without a place.
-fn properties_of(feature: &Feature, fallback: &str) -> Result<NamedRequest, String> {
+fn properties_of(feature: &Feature, fallback: &str) -> Result<Order, String> {
     let text = |key: &str| match feature.property(key) {
         None | Some(serde_json::Value::Null) => Ok(None),
         Some(value) => value.as_str().map(|s| Some(s.to_owned())).ok_or(format!("`{key}` must be a text")),
@@ -310,7 +270,7 @@ fn properties_of(feature: &Feature, fallback: &str) -> Result<NamedRequest, Stri
             count.ok_or("`max_attempts` must be a whole number")?
         }
     };
-    Ok(NamedRequest {
+    Ok(Order {
         client_ref: text("client_ref")?.unwrap_or_else(|| fallback.to_owned()),
         submitter: text("submitter")?.unwrap_or_else(|| MISSION.to_owned()),
         name: text("name")?.unwrap_or_else(|| fallback.to_owned()),
@@ -388,7 +348,7 @@ fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    fn read_text(text: &str) -> Result<Vec<NamedRequest>, String> {
+    fn read_text(text: &str) -> Result<Vec<Order>, String> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text.as_bytes()).unwrap();
         read(file.path(), lengths()).map_err(|error| format!("{:#}", anyhow::Error::from(error)))
@@ -421,8 +381,8 @@ mod tests {
     fn random_requests_survive_a_file_to_the_last_bit() {
         let scenario = swath_sim::requests::scenario::ScenarioConfig::default();
         let random = scenario.generate(&mut swath_sim::rng::stream(3, 1), 500, 6_378_136.6);
-        let named = |(i, request)| NamedRequest::new(format!("r{i}"), format!("strip {i}"), request);
-        let mut requests: Vec<_> = random.into_iter().enumerate().map(named).collect();
+        let order = |(i, request)| Order::new(format!("r{i}"), format!("strip {i}"), request);
+        let mut requests: Vec<_> = random.into_iter().enumerate().map(order).collect();
         requests[3].valid_from_ns = 1_767_225_600_500_000_000;
         requests[3].valid_until_ns = 1_767_229_200_000_000_000;
         requests[4].hold_for_approval = true;
@@ -453,8 +413,8 @@ mod tests {
         let requests = read_text(text).unwrap();
         assert_eq!(requests.iter().map(|r| r.name.as_str()).collect::<Vec<_>>(), ["long 1/3", "long 2/3", "long 3/3"]);
         assert_eq!(requests[1].client_ref, "l 2/3");
-        for (k, named) in requests.iter().enumerate() {
-            let request = &named.request;
+        for (k, order) in requests.iter().enumerate() {
+            let request = &order.request;
             assert!((request.start_longitude_deg - 4.0 * k as f64).abs() < 1e-9);
             assert!((request.end_longitude_deg - 4.0 * (k + 1) as f64).abs() < 1e-9);
         }

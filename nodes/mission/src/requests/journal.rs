@@ -6,8 +6,9 @@ use swath_sim::world::strip::StripId;
 use swath_sim::world::windows::Window;
 
 use super::lifecycle::State;
+use super::reason::Reason;
 use crate::orders::action::Action;
-use crate::orders::geojson::NamedRequest;
+use crate::orders::order::Order;
 
 /// A line of the journal.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +29,7 @@ pub struct Added {
     /// Its number.
     pub id: StripId,
     /// What was asked for.
-    pub named: NamedRequest,
+    pub order: Order,
     /// Its start windows.
     pub windows: Vec<Window>,
     /// When.
@@ -46,8 +47,8 @@ pub struct Change {
     pub id: StripId,
     /// State that it has now.
     pub state: State,
-    /// Reason code and text; 0 and empty without one.
-    pub reason: (u16, String),
+    /// Why, and in words.
+    pub reason: (Reason, String),
     /// Who made the change.
     pub actor: String,
     /// When.
@@ -55,7 +56,7 @@ pub struct Change {
     /// What follows the request around.
     pub standing: Standing,
     /// What was asked for, when it was refused.
-    pub refused: Option<Box<NamedRequest>>,
+    pub refused: Option<Box<Order>>,
 }
 
 /// What a request has gone through so far.
@@ -133,14 +134,4 @@ pub struct InFlight {
     pub t_pre: u32,
     /// Acquisition [ticks].
     pub t_acq: u32,
-}
-
-/// Code and text of a failure.
-#[must_use]
-pub fn failure_reason(failure: FailureReason) -> (u16, &'static str) {
-    match failure {
-        FailureReason::Attitude => (201, "the attitude error exceeded its limit while imaging"),
-        FailureReason::Elevation => (202, "the satellite was too low over the target while imaging"),
-        FailureReason::Interrupted => (203, "the task was cut short"),
-    }
 }

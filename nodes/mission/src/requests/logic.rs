@@ -1,8 +1,6 @@
 //! The request manager without ROS and without its store: every strip ever requested, what is upcoming, what is
 //! fulfilled.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-
 use swath_sim::mission::windows_until;
 use swath_sim::model::Model;
 use swath_sim::requests::catalogue::Entry as Listed;
@@ -13,15 +11,16 @@ use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripId;
-use swath_sim::world::windows::Window;
+use thiserror::Error;
 
-use super::index::Index;
-use super::intake::{Place, place, same_order};
-use super::journal::{Change, Entry, InFlight, Progress, Standing};
-use super::lifecycle::State;
+use super::journal::{Change, Entry, InFlight, Progress};
+use super::lifecycle::{IllegalTransition, State};
+use super::reason::Reason;
 use super::refusal::{Refusal, check_text};
-use crate::orders::action::{Act, Action};
-use crate::orders::geojson::NamedRequest;
+use super::register::Register;
+use super::request::{GUIDANCE, PLANNER, Request, SYSTEM, Stored};
+use crate::orders::action::{Act, Action, Review};
+use crate::orders::order::Order;
 
 /// What the planner is offered for a task.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,47 +46,14 @@ pub struct Abort {
     pub id: StripId,
 }
 
-/// What an operator decides on a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Review {
-    /// A held request is accepted.
-    Release,
-    /// A held request is refused.
-    Reject,
-    /// An accepted request is held.
-    Hold,
-}
-
-/// A request that has a number.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Request {
-    /// What was asked for.
-    pub named: NamedRequest,
-    /// Where it stands.
-    pub state: State,
-    /// Why: code and text; 0 and empty without a reason.
-    pub reason: (u16, String),
-    /// Who brought it there.
+/// A change that was reported and that the life cycle does not have.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("reported by {actor}: {refusal}")]
+pub struct Contradiction {
+    /// Who reported it.
     pub actor: String,
-    /// When it was taken.
-    pub created: Tick,
-    /// When it changed last.
-    pub changed: Tick,
-    /// What it has gone through.
-    pub standing: Standing,
-    /// The request that it replaces.
-    pub supersedes: Option<StripId>,
-}
-
-/// A request as the store gives it back.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Stored {
-    /// The request.
-    pub request: Request,
-    /// Its start windows.
-    pub windows: Vec<Window>,
-    /// The same strip scanned the other way.
-    pub linked: Option<StripId>,
+    /// What is wrong with it.
+    pub refusal: Refusal,
 }
 
 /// What a mission says of its requests.
@@ -99,25 +65,14 @@ pub struct Rules {
     pub max_attempts: u32,
 }
 
-/// Name of the request manager in the history.
-pub const SYSTEM: &str = "request_manager";
-/// Name of guidance in the history.
-pub(super) const GUIDANCE: &str = "guidance";
-/// Name of the planner in the history.
-const PLANNER: &str = "planner";
-
 /// The request manager's state.
 #[derive(Clone, Debug)]
 pub struct RequestLogic {
     pub(super) model: Model,
     pub(super) catalogue: Catalogue,
-    pub(super) index: Index,
-    pub(super) requests: Vec<Request>,
-    pub(super) by_state: BTreeMap<State, BTreeSet<StripId>>,
+    pub(super) register: Register,
     pub(super) situation: Option<Situation>,
     pub(super) rules: Rules,
-    pub(super) by_reference: HashMap<(String, String), StripId>,
-    pub(super) by_place: HashMap<Place, Vec<StripId>>,
     pub(super) rejected: usize,
     pub(super) reward: f64,
     pub(super) progress: Progress,
@@ -129,6 +84,7 @@ pub struct RequestLogic {
     pub(super) last_settled: Option<(u64, f64)>,
     pub(super) journal: Vec<Entry>,
     pub(super) aborts: Vec<Abort>,
+    contradictions: Vec<Contradiction>,
 }
 
 impl RequestLogic {
@@ -140,13 +96,9 @@ impl RequestLogic {
         Self {
             model,
             catalogue,
-            index: Index::default(),
-            requests: Vec::new(),
-            by_state: BTreeMap::new(),
+            register: Register::default(),
             situation: None,
             rules,
-            by_reference: HashMap::new(),
-            by_place: HashMap::new(),
             rejected: 0,
             reward: 0.0,
             progress: Progress::default(),
@@ -155,6 +107,7 @@ impl RequestLogic {
             last_settled: None,
             journal: Vec::new(),
             aborts: Vec::new(),
+            contradictions: Vec::new(),
         }
     }
 
@@ -177,7 +130,7 @@ impl RequestLogic {
         let links: Vec<_> = stored.iter().map(|stored| stored.linked).collect();
         for Stored { request, windows, .. } in stored {
             let strip =
-                request.named.request.to_strip(&self.model.config.requests, self.model.config.earth.radius_m)?;
+                request.order.request.to_strip(&self.model.config.requests, self.model.config.earth.radius_m)?;
             let t_acq = strip.acquisition_ticks(self.model.period);
             self.reward += request.standing.reward;
             self.insert(Prepared { strip, t_acq, windows }, request);
@@ -186,7 +139,7 @@ impl RequestLogic {
             if let Some(linked) = linked {
                 self.catalogue.link(id, linked);
             }
-            match self.requests[id.0 as usize - 1].state {
+            match self.known(id)?.state {
                 State::Held => {
                     self.catalogue.hold(id);
                 }
@@ -199,61 +152,52 @@ impl RequestLogic {
         Ok(())
     }
 
-    /// Takes a request now. The same one again under the same reference of the same submitter gets the number that it
-    /// has.
+    /// Takes a request that comes at a tick: its windows are sought from there. The same one again under the same
+    /// reference of the same submitter gets the number that it has.
     ///
     /// # Errors
     /// Why it is refused.
-    pub fn submit(&mut self, named: NamedRequest) -> Result<StripId, Refusal> {
-        self.submit_at(named, self.now())
-    }
-
-    /// As [`Self::submit`], for a request that came at a tick: its windows are sought from there.
-    ///
-    /// # Errors
-    /// Why it is refused.
-    pub fn submit_at(&mut self, named: NamedRequest, at: Tick) -> Result<StripId, Refusal> {
+    pub fn submit(&mut self, order: Order, at: Tick) -> Result<StripId, Refusal> {
         let known = self.len();
-        let result = self.take_in(&named, None, at);
+        let result = self.take_in(&order, None, at);
         match &result {
             Ok(id) if self.len() > known => {
-                let actor = named.submitter.clone();
-                self.taken(at, actor, String::new(), Act::Submit(*id, Box::new(named)));
+                let actor = order.submitter.clone();
+                self.taken(at, actor, String::new(), Act::Submit(*id, Box::new(order)));
             }
             Ok(_) => {}
-            Err(refusal) => self.note_refusal(named, refusal, at),
+            Err(refusal) => self.note_refusal(order, refusal, at),
         }
         result
     }
 
-    /// Takes a request in place of another one. The same call again gets the number that the request has.
+    /// Takes a request that comes at a tick in place of another one. The same call again gets the number that the
+    /// request has.
     ///
     /// # Errors
     /// Why it is refused; the other one stays as it is then.
-    pub fn replace(&mut self, old: StripId, named: NamedRequest) -> Result<StripId, Refusal> {
-        self.replace_at(old, named, self.now())
-    }
-
-    fn replace_at(&mut self, old: StripId, named: NamedRequest, at: Tick) -> Result<StripId, Refusal> {
+    pub fn replace(&mut self, old: StripId, order: Order, at: Tick) -> Result<StripId, Refusal> {
         if let Some(new) = self.request(old).and_then(|request| request.standing.superseded_by)
-            && self.by_reference(&named.submitter, &named.client_ref) == Some(new)
-            && self.request(new).is_some_and(|request| same_order(&request.named, &named))
+            && self.by_reference(&order.submitter, &order.client_ref) == Some(new)
+            && self.request(new).is_some_and(|known| order.is_for_the_same_as(&known.order))
         {
             return Ok(new);
         }
-        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&named, Some(old), at));
+        let result = self.both_ways(old, State::Superseded).and_then(|_| self.take_in(&order, Some(old), at));
         let new = match result {
             Ok(new) => new,
             Err(refusal) => {
-                self.note_refusal(named, &refusal, at);
+                self.note_refusal(order, &refusal, at);
                 return Err(refusal);
             }
         };
-        let (actor, text) = (named.submitter.clone(), format!("replaced by request {}", new.0));
-        self.taken(at, actor.clone(), String::new(), Act::Replace(old, Box::new(named)));
+        let (actor, text) = (order.submitter.clone(), format!("replaced by request {}", new.0));
+        self.taken(at, actor.clone(), String::new(), Act::Replace(old, Box::new(order)));
         for id in self.both_ways(old, State::Superseded)? {
-            self.requests[id.0 as usize - 1].standing.superseded_by = Some(new);
-            self.leave(id, State::Superseded, (0, text.clone()), &actor)?;
+            if let Some(standing) = self.register.standing_mut(id) {
+                standing.superseded_by = Some(new);
+            }
+            self.leave(id, State::Superseded, (Reason::None, text.clone()), &actor)?;
         }
         Ok(new)
     }
@@ -266,7 +210,7 @@ impl RequestLogic {
         check_text("actor", actor)?;
         check_text("reason", reason)?;
         for id in self.both_ways(id, State::CancelledByUser)? {
-            self.leave(id, State::CancelledByUser, (0, reason.to_owned()), actor)?;
+            self.leave(id, State::CancelledByUser, (Reason::None, reason.to_owned()), actor)?;
         }
         self.taken(self.now(), actor.to_owned(), reason.to_owned(), Act::Cancel(id));
         Ok(())
@@ -286,21 +230,21 @@ impl RequestLogic {
         };
         // A release is for held requests only, although the life cycle has other ways to be accepted.
         if review == Review::Release && self.known(id)?.state != State::Held {
-            let illegal = super::lifecycle::IllegalTransition { from: self.known(id)?.state, to };
+            let illegal = IllegalTransition { from: self.known(id)?.state, to };
             return Err(Refusal::State { id: id.0, illegal });
         }
         for id in self.both_ways(id, to)? {
             match review {
                 Review::Release => {
                     self.catalogue.release(id);
-                    self.stand(id, to, (0, reason.to_owned()), actor)?;
+                    self.stand(id, to, (Reason::None, reason.to_owned()), actor)?;
                 }
                 Review::Hold => {
                     self.catalogue.hold(id);
-                    self.stand(id, to, (0, reason.to_owned()), actor)?;
+                    self.stand(id, to, (Reason::None, reason.to_owned()), actor)?;
                     self.abort_if_under_way(id);
                 }
-                Review::Reject => self.leave(id, to, (0, reason.to_owned()), actor)?,
+                Review::Reject => self.leave(id, to, (Reason::None, reason.to_owned()), actor)?,
             }
         }
         self.taken(self.now(), actor.to_owned(), reason.to_owned(), Act::Review(id, review));
@@ -314,8 +258,8 @@ impl RequestLogic {
     pub fn take_again(&mut self, action: &Action) -> Result<(), Refusal> {
         let (actor, reason) = (&action.actor, &action.reason);
         match &action.act {
-            Act::Submit(_, named) => self.submit_at((**named).clone(), action.at).map(drop),
-            Act::Replace(old, named) => self.replace_at(*old, (**named).clone(), action.at).map(drop),
+            Act::Submit(_, order) => self.submit((**order).clone(), action.at).map(drop),
+            Act::Replace(old, order) => self.replace(*old, (**order).clone(), action.at).map(drop),
             Act::Cancel(id) => self.cancel(*id, actor, reason),
             Act::Review(id, review) => self.review(*id, *review, actor, reason),
             // These are the planner's.
@@ -345,8 +289,8 @@ impl RequestLogic {
         let count = self.model.config.planning.candidates;
         for id in self.catalogue.next(self.progress.now, count, &mut candidates) {
             self.not_flown(id);
-            // The catalogue has none but accepted and held requests now.
-            let _ = self.stand(id, State::Expired, (0, "its last window has closed".to_owned()), SYSTEM);
+            let reason = (Reason::None, "its last window has closed".to_owned());
+            self.must(id, State::Expired, reason, SYSTEM);
         }
         Offer {
             task,
@@ -391,8 +335,10 @@ impl RequestLogic {
             return;
         }
         self.progress.in_flight = Some(flown);
-        self.requests[flown.id.0 as usize - 1].standing.imaging = flown.start.after(flown.t_pre);
-        let _ = self.stand(flown.id, State::Scheduled, (0, String::new()), PLANNER);
+        if let Some(standing) = self.register.standing_mut(flown.id) {
+            standing.imaging = flown.start.after(flown.t_pre);
+        }
+        self.must(flown.id, State::Scheduled, (Reason::None, String::new()), PLANNER);
     }
 
     /// Imaging of a task has begun.
@@ -400,7 +346,7 @@ impl RequestLogic {
         let Some(flown) = self.progress.in_flight.filter(|flown| flown.task == task) else { return };
         self.progress.now = self.progress.now.max(tick);
         if self.state(flown.id) == Some(State::Scheduled) {
-            let _ = self.stand(flown.id, State::Executing, (0, String::new()), GUIDANCE);
+            self.must(flown.id, State::Executing, (Reason::None, String::new()), GUIDANCE);
         }
     }
 
@@ -414,6 +360,11 @@ impl RequestLogic {
         std::mem::take(&mut self.aborts)
     }
 
+    /// Changes that were reported since the last call and that the life cycle does not have.
+    pub fn take_contradictions(&mut self) -> Vec<Contradiction> {
+        std::mem::take(&mut self.contradictions)
+    }
+
     /// Where a request stands.
     #[must_use]
     pub fn state(&self, id: StripId) -> Option<State> {
@@ -423,7 +374,7 @@ impl RequestLogic {
     /// A request by its number.
     #[must_use]
     pub fn request(&self, id: StripId) -> Option<&Request> {
-        self.requests.get(usize::try_from(id.0.checked_sub(1)?).ok()?)
+        self.register.get(id)
     }
 
     /// A request by its number.
@@ -431,13 +382,13 @@ impl RequestLogic {
     /// # Errors
     /// When there is none.
     pub fn known(&self, id: StripId) -> Result<&Request, Refusal> {
-        self.request(id).ok_or(Refusal::Unknown { id: id.0, last: self.requests.len() as u64 })
+        self.request(id).ok_or(Refusal::Unknown { id: id.0, last: self.len() as u64 })
     }
 
     /// The request of a submitter under a reference.
     #[must_use]
     pub fn by_reference(&self, submitter: &str, client_ref: &str) -> Option<StripId> {
-        self.by_reference.get(&(submitter.to_owned(), client_ref.to_owned())).copied()
+        self.register.by_reference(submitter, client_ref)
     }
 
     /// A strip with its windows.
@@ -449,20 +400,20 @@ impl RequestLogic {
     /// Requests that have a number.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.requests.len()
+        self.register.len()
     }
 
     /// Whether no request has a number.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.requests.is_empty()
+        self.register.is_empty()
     }
 
     /// How many requests are in a state; those refused at once are counted too.
     #[must_use]
     pub fn count(&self, state: State) -> usize {
         let refused = if state == State::Rejected { self.rejected } else { 0 };
-        refused + self.by_state.get(&state).map_or(0, BTreeSet::len)
+        refused + self.register.count(state)
     }
 
     /// Reward earned so far.
@@ -506,22 +457,11 @@ impl RequestLogic {
     }
 
     /// A request leaves for good.
-    fn leave(&mut self, id: StripId, to: State, reason: (u16, String), actor: &str) -> Result<(), Refusal> {
+    fn leave(&mut self, id: StripId, to: State, reason: (Reason, String), actor: &str) -> Result<(), Refusal> {
         self.stand(id, to, reason, actor)?;
         self.catalogue.remove(id);
-        self.forget_place(id);
         self.abort_if_under_way(id);
         Ok(())
-    }
-
-    pub(super) fn forget_place(&mut self, id: StripId) {
-        let Some(key) = self.request(id).map(|request| place(&request.named.request)) else { return };
-        if let Some(there) = self.by_place.get_mut(&key) {
-            there.retain(|&other| other != id);
-            if there.is_empty() {
-                self.by_place.remove(&key);
-            }
-        }
     }
 
     fn abort_if_under_way(&mut self, id: StripId) {
@@ -530,24 +470,20 @@ impl RequestLogic {
         }
     }
 
-    /// The one place where a request that has a number changes its state.
-    pub(super) fn stand(&mut self, id: StripId, to: State, reason: (u16, String), actor: &str) -> Result<(), Refusal> {
-        let state = self.known(id)?.state.step(to).map_err(|illegal| Refusal::State { id: id.0, illegal })?;
-        let now = self.now();
-        let request = &mut self.requests[id.0 as usize - 1];
-        let before = std::mem::replace(&mut request.state, state);
-        request.reason = reason;
-        actor.clone_into(&mut request.actor);
-        request.changed = now;
-        if let Some(set) = self.by_state.get_mut(&before) {
-            set.remove(&id);
-        }
-        self.by_state.entry(state).or_default().insert(id);
-        if state == State::Expired {
-            self.forget_place(id);
-        }
+    /// A request changes its state, which is written down.
+    fn stand(&mut self, id: StripId, to: State, reason: (Reason, String), actor: &str) -> Result<(), Refusal> {
+        self.known(id)?;
+        let step = self.register.step(id, to, reason, actor, self.progress.now);
+        step.map_err(|illegal| Refusal::State { id: id.0, illegal })?;
         self.note(id);
         Ok(())
+    }
+
+    /// A change that was reported rather than asked for: if the life cycle does not have it, someone must hear of it.
+    pub(super) fn must(&mut self, id: StripId, to: State, reason: (Reason, String), actor: &str) {
+        if let Err(refusal) = self.stand(id, to, reason, actor) {
+            self.contradictions.push(Contradiction { actor: actor.to_owned(), refusal });
+        }
     }
 
     pub(super) fn note(&mut self, id: StripId) {

@@ -6,7 +6,10 @@ pub mod journal;
 pub mod lifecycle;
 pub mod logic;
 pub mod query;
+pub mod reason;
 pub mod refusal;
+pub mod register;
+pub mod request;
 mod settle;
 
 #[cfg(test)]

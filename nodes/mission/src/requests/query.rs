@@ -14,7 +14,7 @@ use super::index::Area;
 use super::lifecycle::State;
 use super::logic::RequestLogic;
 use super::refusal::Refusal;
-use crate::orders::geojson::NamedRequest;
+use crate::orders::order::Order;
 
 /// Which requests are listed.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,20 +88,16 @@ impl RequestLogic {
         let next = StripId(after.0.saturating_add(1));
         // The narrowest way in: a place, a time, a few states, or all.
         if let Some(area) = &filter.area {
-            return page(&mut self.index.near(area).into_iter().filter(|id| *id >= next));
+            return page(&mut self.register.near(area).into_iter().filter(|id| *id >= next));
         }
         if let Some((from, until)) = filter.between {
-            return page(&mut self.index.between(from, until).into_iter().filter(|id| *id >= next));
+            return page(&mut self.register.between(from, until).into_iter().filter(|id| *id >= next));
         }
         if filter.states.is_empty() {
-            return page(&mut (next.0..=self.requests.len() as u64).map(StripId));
+            return page(&mut (next.0..=self.len() as u64).map(StripId));
         }
-        let mut ids: Vec<_> = filter
-            .states
-            .iter()
-            .filter_map(|state| self.by_state.get(state))
-            .flat_map(|ids| ids.range(next..).take(limit + 1).copied())
-            .collect();
+        let mut ids: Vec<_> =
+            filter.states.iter().flat_map(|state| self.register.in_state(*state, next, limit + 1)).collect();
         ids.sort_unstable();
         ids.dedup();
         page(&mut ids.into_iter())
@@ -121,8 +117,8 @@ impl RequestLogic {
     ///
     /// # Errors
     /// Why it would be refused.
-    pub fn preview(&self, named: &NamedRequest, until: Tick) -> Result<Vec<Opportunity>, Refusal> {
-        let ways = self.prepare(named, self.now())?;
+    pub fn preview(&self, order: &Order, until: Tick) -> Result<Vec<Opportunity>, Refusal> {
+        let ways = self.prepare(order, self.now())?;
         Ok(ways.first().map_or(Vec::new(), |(_, prepared)| self.opportunities(prepared, until, None)))
     }
 
@@ -142,7 +138,7 @@ impl RequestLogic {
         let now = self.now();
         let coming = windows.iter().filter(|window| window.close > now && window.open <= until);
         let opportunities = coming.take(OPPORTUNITIES_MAX).map(|&window| {
-            let candidate = Candidate { id: own.unwrap_or(StripId(0)), strip, t_acq, window };
+            let candidate = Candidate { id: own.unwrap_or(StripId(0)), twin: None, strip, t_acq, window };
             let mut conflicts = self.conflicts(window, t_acq, own);
             conflicts.sort_by_key(|&(priority, id)| (Reverse(priority), id));
             Opportunity {
@@ -165,7 +161,7 @@ impl RequestLogic {
     fn conflicts(&self, window: Window, t_acq: u32, own: Option<StripId>) -> Vec<(u64, StripId)> {
         let until = window.close.after(t_acq);
         let twin = own.and_then(|own| self.strip(own)?.linked);
-        let others = self.index.between(window.open, until).into_iter();
+        let others = self.register.between(window.open, until).into_iter();
         let others = others.filter(|&id| Some(id) != own && Some(id) != twin);
         let waits = others.filter(|&id| matches!(self.state(id), Some(State::Accepted | State::Scheduled)));
         let waits = waits.filter_map(|id| {

@@ -1,9 +1,10 @@
-//! Why the request manager refuses something: each reason has a number, and names the value and the limit.
+//! Why the request manager refuses something, with the value and the limit.
 
 use swath_sim::error::StripError;
 use thiserror::Error;
 
 use super::lifecycle::IllegalTransition;
+use super::reason::Reason;
 
 /// Longest name, reference or reason [characters].
 pub const TEXT_MAX: usize = 256;
@@ -126,21 +127,27 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// Stable number of the reason: the REASON constants of `swath_msgs/msg/StripStatus`.
+    /// The reason.
+    #[must_use]
+    pub fn reason(&self) -> Reason {
+        match self {
+            Self::Strip(error) => error.into(),
+            Self::ValidityOrder { .. } | Self::ValidityOver { .. } => Reason::Validity,
+            Self::TextLength { .. } | Self::TextCharacter { .. } => Reason::Text,
+            Self::Reference { .. } => Reason::Duplicate,
+            Self::Capacity { .. } | Self::Batch { .. } => Reason::Capacity,
+            Self::Empty => Reason::Empty,
+            Self::SameStrip { .. } => Reason::SameStrip,
+            Self::Unknown { .. } | Self::UnknownReference { .. } => Reason::Unknown,
+            Self::State { .. } => Reason::State,
+            Self::Call { .. } | Self::Attempts { .. } => Reason::Call,
+        }
+    }
+
+    /// Stable number of the reason.
     #[must_use]
     pub fn code(&self) -> u16 {
-        match self {
-            Self::Strip(error) => error.code(),
-            Self::ValidityOrder { .. } | Self::ValidityOver { .. } => 106,
-            Self::TextLength { .. } | Self::TextCharacter { .. } => 107,
-            Self::Reference { .. } => 108,
-            Self::Capacity { .. } | Self::Batch { .. } => 109,
-            Self::Empty => 112,
-            Self::SameStrip { .. } => 113,
-            Self::Unknown { .. } | Self::UnknownReference { .. } => 120,
-            Self::State { .. } => 121,
-            Self::Call { .. } | Self::Attempts { .. } => 122,
-        }
+        self.reason().number()
     }
 }
 

@@ -3,9 +3,11 @@
 use swath_sim::task::{FailureReason, TaskRecord};
 use swath_sim::world::strip::StripId;
 
-use super::journal::{Attempt, Entry, Outcome, failure_reason};
+use super::journal::{Attempt, Entry, Outcome};
 use super::lifecycle::State;
-use super::logic::{GUIDANCE, Request, RequestLogic, SYSTEM};
+use super::logic::RequestLogic;
+use super::reason::Reason;
+use super::request::{GUIDANCE, SYSTEM};
 
 impl RequestLogic {
     /// A task that imaged, or should have imaged, a strip has ended. Returns its reward.
@@ -13,17 +15,18 @@ impl RequestLogic {
         self.progress.in_flight = self.progress.in_flight.filter(|flown| flown.task > record.task);
         let Some(id) = record.strip else { return 0.0 };
         let worth = self.catalogue.get(id).map_or(0.0, |entry| entry.strip.priority);
-        let Some(request) = self.request_mut(id) else { return 0.0 };
-        request.standing.attempts += 1;
-        request.standing.imaging = record.start.after(record.t_pre);
-        let wanted = !request.state.is_final();
+        let Some(wanted) = self.state(id).map(|state| !state.is_final()) else { return 0.0 };
         let outcome = match record.outcome.failure {
             _ if !wanted => Outcome::Cancelled,
             None => Outcome::Succeeded,
             Some(failure) => Outcome::Failed(failure),
         };
         let reward = if outcome == Outcome::Succeeded { worth } else { 0.0 };
-        request.standing.reward += reward;
+        if let Some(standing) = self.register.standing_mut(id) {
+            standing.attempts += 1;
+            standing.imaging = record.start.after(record.t_pre);
+            standing.reward += reward;
+        }
         self.reward += reward;
         self.journal.push(Entry::Attempted(Attempt {
             id,
@@ -49,36 +52,35 @@ impl RequestLogic {
         self.catch_up(id, State::Executing);
         let twin = self.catalogue.get(id).and_then(|entry| entry.linked);
         self.catalogue.fulfil(id);
-        let _ = self.stand(id, State::Completed, (0, String::new()), GUIDANCE);
-        self.forget_place(id);
+        self.must(id, State::Completed, (Reason::None, String::new()), GUIDANCE);
         if let Some(twin) = twin.filter(|&twin| self.state(twin).is_some_and(|state| !state.is_final())) {
             let text = format!("request {} was imaged", id.0);
-            let _ = self.stand(twin, State::FulfilledByLink, (0, text), SYSTEM);
-            self.forget_place(twin);
+            self.must(twin, State::FulfilledByLink, (Reason::None, text), SYSTEM);
         }
     }
 
     fn not_imaged(&mut self, id: StripId, failure: FailureReason) {
-        let (code, text) = failure_reason(failure);
         if self.state(id) == Some(State::Held) {
             return self.note(id);
         }
+        let text = match failure {
+            FailureReason::Attitude => "the attitude error exceeded its limit while imaging",
+            FailureReason::Elevation => "the satellite was too low over the target while imaging",
+            FailureReason::Interrupted => "the task was cut short",
+        };
         let begun = failure != FailureReason::Interrupted;
         self.catch_up(id, if begun { State::Executing } else { State::Scheduled });
-        let default = self.rules.max_attempts;
-        let Some(request) = self.request_mut(id) else { return };
-        request.standing.counted += u32::from(begun);
-        let allowed = if request.named.max_attempts == 0 { default } else { request.named.max_attempts };
-        let used_up = begun && request.standing.counted >= allowed;
-        let _ = if used_up {
+        let Some(asked) = self.request(id).map(|request| request.order.max_attempts) else { return };
+        let allowed = if asked == 0 { self.rules.max_attempts } else { asked };
+        let Some(standing) = self.register.standing_mut(id) else { return };
+        standing.counted += u32::from(begun);
+        if begun && standing.counted >= allowed {
             let text = format!("{text}; this was attempt {allowed} of {allowed}");
-            self.stand(id, State::Failed, (code, text), GUIDANCE).map(|()| {
-                self.catalogue.remove(id);
-                self.forget_place(id);
-            })
+            self.must(id, State::Failed, (Reason::Attempts, text), GUIDANCE);
+            self.catalogue.remove(id);
         } else {
-            self.stand(id, State::Accepted, (code, text.to_owned()), GUIDANCE)
-        };
+            self.must(id, State::Accepted, (failure.into(), text.to_owned()), GUIDANCE);
+        }
     }
 
     /// Goes through the steps that were not heard of, such as while the request manager was away.
@@ -86,7 +88,7 @@ impl RequestLogic {
         for step in [State::Accepted, State::Scheduled, State::Executing] {
             let behind = self.state(id).is_some_and(|state| state < step);
             if behind && step <= to {
-                let _ = self.stand(id, step, (0, String::new()), SYSTEM);
+                self.must(id, step, (Reason::None, String::new()), SYSTEM);
             }
         }
     }
@@ -94,12 +96,8 @@ impl RequestLogic {
     /// The task of a strip was not flown: another one was, or none.
     pub(super) fn not_flown(&mut self, id: StripId) {
         if self.state(id) == Some(State::Scheduled) {
-            let reason = (204, "the task was given up before it began".to_owned());
-            let _ = self.stand(id, State::Accepted, reason, SYSTEM);
+            let reason = (Reason::NotFlown, "the task was given up before it began".to_owned());
+            self.must(id, State::Accepted, reason, SYSTEM);
         }
-    }
-
-    fn request_mut(&mut self, id: StripId) -> Option<&mut Request> {
-        self.requests.get_mut(usize::try_from(id.0.checked_sub(1)?).ok()?)
     }
 }

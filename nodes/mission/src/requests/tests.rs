@@ -1,5 +1,7 @@
 //! The request manager's life cycle, by examples.
 
+use std::collections::BTreeSet;
+
 use swath_sim::config::SimConfig;
 use swath_sim::model::Model;
 use swath_sim::rng;
@@ -11,10 +13,12 @@ use swath_sim::world::strip::{StripId, StripRequest};
 use super::index::Area;
 use super::journal::{Entry, InFlight};
 use super::lifecycle::State;
-use super::logic::{Abort, RequestLogic, Review, Rules};
+use super::logic::{Abort, RequestLogic, Rules};
 use super::query::Filter;
+use super::reason::Reason;
 use super::refusal::Refusal;
-use crate::orders::geojson::NamedRequest;
+use crate::orders::action::Review;
+use crate::orders::order::Order;
 
 const EPOCH_NS: u64 = 1_767_225_600_000_000_000;
 
@@ -25,7 +29,7 @@ fn logic() -> RequestLogic {
 }
 
 /// A strip of 250 km near the equator.
-fn equatorial(client_ref: &str, longitude_deg: f64) -> NamedRequest {
+fn equatorial(client_ref: &str, longitude_deg: f64) -> Order {
     let request = StripRequest {
         start_latitude_deg: 5.0,
         start_longitude_deg: longitude_deg,
@@ -35,13 +39,23 @@ fn equatorial(client_ref: &str, longitude_deg: f64) -> NamedRequest {
         acquisition_speed_m_s: 3000.0,
         bidirectional: false,
     };
-    NamedRequest::new(client_ref.to_owned(), client_ref.to_owned(), request)
+    Order::new(client_ref.to_owned(), client_ref.to_owned(), request)
 }
 
-fn both_ways(client_ref: &str, longitude_deg: f64) -> NamedRequest {
-    let mut named = equatorial(client_ref, longitude_deg);
-    named.request.bidirectional = true;
-    named
+fn both_ways(client_ref: &str, longitude_deg: f64) -> Order {
+    let mut order = equatorial(client_ref, longitude_deg);
+    order.request.bidirectional = true;
+    order
+}
+
+/// Submits now.
+fn submit(logic: &mut RequestLogic, order: Order) -> Result<StripId, Refusal> {
+    logic.submit(order, logic.now())
+}
+
+/// Replaces now.
+fn replace(logic: &mut RequestLogic, old: StripId, order: Order) -> Result<StripId, Refusal> {
+    logic.replace(old, order, logic.now())
 }
 
 fn chosen(task: u64, id: StripId) -> InFlight {
@@ -72,49 +86,50 @@ fn states(logic: &mut RequestLogic, id: StripId) -> Vec<State> {
 #[test]
 fn the_same_request_again_is_the_same_strip_and_another_under_its_name_is_refused() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("a", 10.0)).unwrap();
-    assert_eq!(logic.submit(equatorial("a", 10.0)), Ok(id));
-    assert_eq!(logic.submit(equatorial("a", 20.0)).unwrap_err().code(), 108);
-    let other = NamedRequest { submitter: "ops".to_owned(), ..equatorial("a", 20.0) };
-    assert_eq!(logic.submit(other), Ok(StripId(2)), "references are each submitter's own");
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
+    assert_eq!(submit(&mut logic, equatorial("a", 10.0)), Ok(id));
+    assert_eq!(submit(&mut logic, equatorial("a", 20.0)).unwrap_err().code(), 108);
+    let other = Order { submitter: "ops".to_owned(), ..equatorial("a", 20.0) };
+    assert_eq!(submit(&mut logic, other), Ok(StripId(2)), "references are each submitter's own");
     assert_eq!((logic.count(State::Accepted), logic.count(State::Rejected)), (2, 1));
 }
 
 #[test]
 fn the_same_strip_is_found_although_it_has_another_name() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("", 10.0)).unwrap();
-    let refusal = logic.submit(equatorial("", 10.000_001)).unwrap_err();
+    let id = submit(&mut logic, equatorial("", 10.0)).unwrap();
+    let refusal = submit(&mut logic, equatorial("", 10.000_001)).unwrap_err();
     assert_eq!(refusal, Refusal::SameStrip { id: id.0, state: "accepted" });
     let day_ns = 86_400_000_000_000;
-    let morning = NamedRequest { valid_until_ns: EPOCH_NS + day_ns / 2, ..equatorial("m", 30.0) };
-    let evening = NamedRequest { valid_from_ns: EPOCH_NS + day_ns / 2, ..equatorial("e", 30.0) };
-    logic.submit(morning).unwrap();
-    logic.submit(evening).unwrap();
+    let morning = Order { valid_until_ns: EPOCH_NS + day_ns / 2, ..equatorial("m", 30.0) };
+    let evening = Order { valid_from_ns: EPOCH_NS + day_ns / 2, ..equatorial("e", 30.0) };
+    submit(&mut logic, morning).unwrap();
+    submit(&mut logic, evening).unwrap();
     logic.cancel(id, "ops", "").unwrap();
-    logic.submit(equatorial("again", 10.0)).unwrap();
+    submit(&mut logic, equatorial("again", 10.0)).unwrap();
 }
 
 #[test]
 fn a_failed_strip_is_offered_again_until_its_attempts_are_used_up() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("a", 10.0)).unwrap();
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
     fly(&mut logic, 0, id, Some(FailureReason::Attitude));
     fly(&mut logic, 1, id, Some(FailureReason::Interrupted));
     fly(&mut logic, 2, id, Some(FailureReason::Elevation));
     assert_eq!(logic.state(id), Some(State::Accepted));
-    assert_eq!(logic.request(id).unwrap().reason.0, 202);
+    assert_eq!(logic.request(id).unwrap().reason.0, Reason::Elevation);
     fly(&mut logic, 3, id, Some(FailureReason::Attitude));
     let request = logic.request(id).unwrap();
     assert_eq!((request.state, request.standing.attempts, request.standing.counted), (State::Failed, 4, 3));
     assert!(request.reason.1.ends_with("this was attempt 3 of 3"), "{:?}", request.reason);
+    assert_eq!(request.reason.0, Reason::Attempts);
     assert!(logic.on_decision_point(5, Tick(1500), &[]).candidates.is_empty());
 }
 
 #[test]
 fn an_imaged_strip_pays_once_and_is_not_offered_again() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("a", 10.0)).unwrap();
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
     fly(&mut logic, 0, id, None);
     let again = record(0, id, None);
     let offer = logic.on_decision_point(1, Tick(300), &[again.clone(), again]);
@@ -126,14 +141,14 @@ fn an_imaged_strip_pays_once_and_is_not_offered_again() {
 #[test]
 fn a_result_is_settled_although_its_beginning_was_not_heard_of() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("a", 10.0)).unwrap();
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
     logic.on_decision_point(1, Tick(300), &[record(0, id, None)]);
     let went = states(&mut logic, id);
     assert_eq!(went, [State::Accepted, State::Scheduled, State::Executing, State::Completed]);
-    let id = logic.submit(equatorial("b", 10.0)).unwrap();
+    let id = submit(&mut logic, equatorial("b", 10.0)).unwrap();
     logic.on_task(chosen(1, id));
     logic.on_decision_point(3, Tick(900), &[]);
-    assert_eq!(logic.request(id).unwrap().reason.0, 204, "task 1 was not flown");
+    assert_eq!(logic.request(id).unwrap().reason.0, Reason::NotFlown, "task 1 was not flown");
     logic.on_task(chosen(1, id));
     assert_eq!(logic.state(id), Some(State::Accepted), "task 1 is no longer wanted");
     logic.on_task(chosen(3, id));
@@ -144,11 +159,11 @@ fn a_result_is_settled_although_its_beginning_was_not_heard_of() {
 #[test]
 fn twins_are_fulfilled_cancelled_and_held_together() {
     let mut logic = logic();
-    let (one, two) = (logic.submit(both_ways("a", 10.0)).unwrap(), StripId(2));
-    assert_eq!(logic.submit(both_ways("a", 10.0)), Ok(one));
+    let (one, two) = (submit(&mut logic, both_ways("a", 10.0)).unwrap(), StripId(2));
+    assert_eq!(submit(&mut logic, both_ways("a", 10.0)), Ok(one));
     fly(&mut logic, 0, two, None);
     assert_eq!((logic.state(one), logic.state(two)), (Some(State::FulfilledByLink), Some(State::Completed)));
-    let (three, four) = (logic.submit(both_ways("b", 40.0)).unwrap(), StripId(4));
+    let (three, four) = (submit(&mut logic, both_ways("b", 40.0)).unwrap(), StripId(4));
     logic.review(four, Review::Hold, "ops", "weather").unwrap();
     assert_eq!((logic.state(three), logic.state(four)), (Some(State::Held), Some(State::Held)));
     assert_eq!(logic.on_decision_point(2, Tick(600), &[]).pending, 0);
@@ -160,13 +175,13 @@ fn twins_are_fulfilled_cancelled_and_held_together() {
 #[test]
 fn cancelling_while_slewing_gives_the_task_up_and_is_refused_once_imaging_has_begun() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("a", 10.0)).unwrap();
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
     logic.on_task(chosen(0, id));
     logic.cancel(id, "ops", "clouds").unwrap();
     assert_eq!(logic.take_aborts(), [Abort { task: 0, id }]);
     logic.on_decision_point(1, Tick(50), &[record(0, id, Some(FailureReason::Interrupted))]);
     assert_eq!(logic.state(id), Some(State::CancelledByUser));
-    let id = logic.submit(both_ways("b", 10.0)).unwrap();
+    let id = submit(&mut logic, both_ways("b", 10.0)).unwrap();
     logic.on_task(chosen(1, id));
     logic.on_imaging(1, Tick(400));
     for id in [id, StripId(id.0 + 1)] {
@@ -174,10 +189,10 @@ fn cancelling_while_slewing_gives_the_task_up_and_is_refused_once_imaging_has_be
         assert_eq!(refusal.code(), 121);
         assert!(refusal.to_string().contains("that is executing cannot become cancelled by user"), "{refusal}");
     }
-    assert_eq!(logic.replace(id, equatorial("c", 50.0)).unwrap_err().code(), 121);
+    assert_eq!(replace(&mut logic, id, equatorial("c", 50.0)).unwrap_err().code(), 121);
     assert_eq!(logic.state(id), Some(State::Executing));
     // Chosen before the cancellation was heard of.
-    let late = logic.submit(equatorial("late", 80.0)).unwrap();
+    let late = submit(&mut logic, equatorial("late", 80.0)).unwrap();
     logic.on_decision_point(2, Tick(600), &[record(1, id, None)]);
     logic.cancel(late, "ops", "").unwrap();
     logic.on_task(chosen(2, late));
@@ -187,28 +202,28 @@ fn cancelling_while_slewing_gives_the_task_up_and_is_refused_once_imaging_has_be
 #[test]
 fn a_replacement_takes_over_and_a_refused_one_changes_nothing() {
     let mut logic = logic();
-    let old = logic.submit(equatorial("a", 10.0)).unwrap();
+    let old = submit(&mut logic, equatorial("a", 10.0)).unwrap();
     let mut bad = equatorial("a", 10.0);
     bad.request.priority = 2.0;
-    assert_eq!(logic.replace(old, bad).unwrap_err().code(), 103);
+    assert_eq!(replace(&mut logic, old, bad).unwrap_err().code(), 103);
     assert_eq!(logic.state(old), Some(State::Accepted));
     let mut better = equatorial("a", 10.0);
     better.request.priority = 0.9;
-    let new = logic.replace(old, better.clone()).unwrap();
+    let new = replace(&mut logic, old, better.clone()).unwrap();
     assert_eq!(logic.request(old).unwrap().standing.superseded_by, Some(new));
     assert_eq!(logic.request(new).unwrap().supersedes, Some(old));
     assert_eq!((logic.state(old), logic.state(new)), (Some(State::Superseded), Some(State::Accepted)));
-    assert_eq!(logic.replace(old, better.clone()), Ok(new), "the same call again");
-    assert_eq!(logic.submit(better), Ok(new), "the reference is the new one's");
-    assert_eq!(logic.replace(old, equatorial("z", 80.0)).unwrap_err().code(), 121);
-    assert_eq!(logic.replace(StripId(99), equatorial("z", 80.0)).unwrap_err().code(), 120);
+    assert_eq!(replace(&mut logic, old, better.clone()), Ok(new), "the same call again");
+    assert_eq!(submit(&mut logic, better), Ok(new), "the reference is the new one's");
+    assert_eq!(replace(&mut logic, old, equatorial("z", 80.0)).unwrap_err().code(), 121);
+    assert_eq!(replace(&mut logic, StripId(99), equatorial("z", 80.0)).unwrap_err().code(), 120);
 }
 
 #[test]
 fn requests_expire_when_their_last_window_or_their_validity_is_over() {
     let mut logic = logic();
-    let id = logic.submit(equatorial("a", 10.0)).unwrap();
-    let held = logic.submit(NamedRequest { hold_for_approval: true, ..equatorial("b", 40.0) }).unwrap();
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
+    let held = submit(&mut logic, Order { hold_for_approval: true, ..equatorial("b", 40.0) }).unwrap();
     assert_eq!(logic.state(held), Some(State::Held));
     logic.on_decision_point(1, Tick(400_000), &[]);
     assert_eq!((logic.state(id), logic.state(held)), (Some(State::Expired), Some(State::Expired)));
@@ -218,10 +233,10 @@ fn requests_expire_when_their_last_window_or_their_validity_is_over() {
 #[test]
 fn bad_requests_are_refused_each_with_its_reason() {
     let mut logic = logic();
-    let mut code = |change: fn(&mut NamedRequest)| {
-        let mut named = equatorial("bad", 10.0);
-        change(&mut named);
-        logic.submit(named).unwrap_err().code()
+    let mut code = |change: fn(&mut Order)| {
+        let mut order = equatorial("bad", 10.0);
+        change(&mut order);
+        submit(&mut logic, order).unwrap_err().code()
     };
     assert_eq!(code(|n| n.request.start_latitude_deg = f64::NAN), 100);
     assert_eq!(code(|n| n.request.acquisition_speed_m_s = f64::INFINITY), 100);
@@ -242,7 +257,7 @@ fn bad_requests_are_refused_each_with_its_reason() {
     assert_eq!(code(|n| n.max_attempts = 1001), 122);
     assert_eq!(logic.count(State::Rejected), 17);
     let longest = logic.take_journal().into_iter().filter_map(|entry| match entry {
-        Entry::Changed(change) => change.refused.map(|named| named.name.len()),
+        Entry::Changed(change) => change.refused.map(|order| order.name.len()),
         _ => None,
     });
     assert_eq!(longest.max(), Some(256), "what is written down of a refused request is short");
@@ -257,7 +272,8 @@ fn calls_hold_one_to_a_hundred_thousand_entries() {
 #[test]
 fn lists_go_by_state_area_and_time_page_by_page() {
     let mut logic = logic();
-    let ids: Vec<_> = (0..30).map(|i| logic.submit(equatorial(&format!("{i}"), f64::from(i) * 5.0)).unwrap()).collect();
+    let ids: Vec<_> =
+        (0..30).map(|i| submit(&mut logic, equatorial(&format!("{i}"), f64::from(i) * 5.0)).unwrap()).collect();
     for id in &ids[..10] {
         logic.cancel(*id, "ops", "").unwrap();
     }
@@ -284,9 +300,9 @@ fn previews_say_when_and_at_what_cost_without_taking_anything() {
     let mut logic = logic();
     let rivals: Vec<_> = (0..5)
         .map(|i| {
-            let mut named = equatorial(&format!("{i}"), 10.0 + f64::from(i));
-            named.request.priority = 0.1 + 0.1 * f64::from(i);
-            logic.submit(named).unwrap()
+            let mut order = equatorial(&format!("{i}"), 10.0 + f64::from(i));
+            order.request.priority = 0.1 + 0.1 * f64::from(i);
+            submit(&mut logic, order).unwrap()
         })
         .collect();
     let opportunities = logic.preview(&equatorial("mine", 12.5), Tick(172_800)).unwrap();
@@ -302,4 +318,70 @@ fn previews_say_when_and_at_what_cost_without_taking_anything() {
     assert_eq!(logic.outlook(rivals[0], Tick(172_800)).unwrap()[0].window, logic.strip(rivals[0]).unwrap().windows[0]);
     logic.cancel(rivals[0], "ops", "").unwrap();
     assert!(logic.outlook(rivals[0], Tick(172_800)).unwrap().is_empty());
+}
+
+/// A life in which everything goes wrong that can; every reason that anybody is given.
+fn reasons_of_a_bad_day() -> BTreeSet<Reason> {
+    let mut logic = logic();
+    let mut refused =
+        vec![super::refusal::check_batch(0).unwrap_err(), super::refusal::check_batch(100_001).unwrap_err()];
+    let spoilt: [fn(&mut Order); 11] = [
+        |order| order.request.start_latitude_deg = f64::NAN,
+        |order| order.request.end_latitude_deg = 91.0,
+        |order| order.request.start_longitude_deg = -181.0,
+        |order| order.request.priority = 1.01,
+        |order| order.request.acquisition_speed_m_s = 4001.0,
+        |order| order.request.end_longitude_deg = 30.0,
+        |order| order.valid_until_ns = 1,
+        |order| order.name = "\u{7}".to_owned(),
+        |order| order.valid_until_ns = EPOCH_NS + 1_000_000_000,
+        |order| (order.request.end_latitude_deg, order.request.end_longitude_deg) = (-5.0, -170.0),
+        |order| order.max_attempts = 1001,
+    ];
+    for spoil in spoilt {
+        let mut order = equatorial("bad", 10.0);
+        spoil(&mut order);
+        refused.push(submit(&mut logic, order).unwrap_err());
+    }
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
+    refused.push(submit(&mut logic, equatorial("a", 20.0)).unwrap_err());
+    refused.push(submit(&mut logic, equatorial("b", 10.0)).unwrap_err());
+    refused.push(logic.cancel(StripId(99), "ops", "").unwrap_err());
+    refused.push(logic.review(id, Review::Release, "ops", "").unwrap_err());
+    logic.on_task(chosen(0, id));
+    logic.on_decision_point(1, Tick(300), &[]);
+    let went_wrong =
+        [FailureReason::Interrupted, FailureReason::Elevation, FailureReason::Attitude, FailureReason::Attitude];
+    for (task, failure) in (1..).zip(went_wrong) {
+        fly(&mut logic, task, id, Some(failure));
+    }
+    assert_eq!(logic.state(id), Some(State::Failed));
+    let told = logic.take_journal().into_iter().filter_map(|entry| match entry {
+        Entry::Changed(change) => Some(change.reason.0),
+        _ => None,
+    });
+    told.chain(refused.iter().map(Refusal::reason)).collect()
+}
+
+#[test]
+fn every_reason_is_given_by_something() {
+    assert_eq!(reasons_of_a_bad_day().into_iter().collect::<Vec<_>>(), Reason::ALL);
+}
+
+#[test]
+fn a_report_that_contradicts_the_life_cycle_is_told() {
+    let mut logic = logic();
+    let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
+    logic.on_task(chosen(0, id));
+    logic.on_imaging(0, Tick(100));
+    assert!(logic.take_contradictions().is_empty());
+    // Its last window has closed, and yet nobody said how its imaging ended.
+    logic.on_decision_point(0, Tick(400_000), &[]);
+    let told = logic.take_contradictions();
+    let [contradiction] = &told[..] else { panic!("{told:?}") };
+    assert_eq!(
+        contradiction.to_string(),
+        "reported by request_manager: request 1: a request that is executing cannot become expired"
+    );
+    assert_eq!(logic.state(id), Some(State::Executing));
 }

@@ -1,7 +1,8 @@
 //! Guidance's messages.
 
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::{MessageError, acquisition, spacecraft_state, vector3};
+use swath_node::error::MessageError;
+use swath_node::messages::{acquisition, spacecraft_state, vector3};
 use swath_node::stamp::{BODY_FRAME, Stamper};
 use swath_sim::model::Model;
 use swath_sim::task::{FailureReason, Task};

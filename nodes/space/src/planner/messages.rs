@@ -1,7 +1,8 @@
 //! The planner's messages.
 
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::{MessageError, acquisition};
+use swath_node::error::MessageError;
+use swath_node::messages::acquisition;
 use swath_node::orders::mode_number;
 use swath_node::stamp::{EARTH_FRAME, Stamper};
 use swath_sim::model::Model;
@@ -26,6 +27,7 @@ pub fn upcoming(model: &Model, message: &msg::UpcomingStrips) -> Result<Upcoming
     let candidates = message.candidates.iter().map(|candidate| {
         Ok(Candidate {
             id: StripId(candidate.strip.id),
+            twin: (candidate.twin > 0).then_some(StripId(candidate.twin)),
             strip: acquisition(model, &candidate.strip, candidate.t_acq_ticks)?,
             t_acq: candidate.t_acq_ticks,
             window: Window { open: Tick(candidate.window_open_tick), close: Tick(candidate.window_close_tick) },

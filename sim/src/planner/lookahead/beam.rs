@@ -1,8 +1,8 @@
 //! A planner that flies sequences of tasks in its head and begins the one that pays most per second.
 
-use super::super::{Decision, DecisionContext, Planner, PlannerError};
+use super::super::decision::{Decision, DecisionContext, Planner, PlannerError, wait_for_a_window};
+use super::experience::{Allowance, Experience};
 use super::search::Search;
-use super::{Allowance, Experience, wait_for_a_window};
 use crate::requests::catalogue::Candidate;
 use crate::vehicle::flight::Situation;
 
@@ -143,8 +143,7 @@ impl BeamSearch {
 
 /// Candidates that a sequence could go on with, the most promising first, with the greatest ratio that each could give.
 fn order(search: &Search<'_>, candidates: &[Candidate], so_far: &Sequence) -> Vec<(f64, usize)> {
-    let is_paid =
-        |i: usize| so_far.imaged.iter().any(|&j| i == j || candidates[i].strip.is_twin_of(&candidates[j].strip));
+    let is_paid = |i: usize| so_far.imaged.iter().any(|&j| i == j || candidates[i].twin == Some(candidates[j].id));
     let left = candidates.iter().enumerate().filter(|(i, _)| !is_paid(*i));
     let mut order: Vec<(f64, usize)> = left
         .filter_map(|(i, candidate)| {

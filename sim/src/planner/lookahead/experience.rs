@@ -1,6 +1,6 @@
 //! What a planner learns of the satellite from how its own tasks went.
 
-use super::super::{Decision, DecisionContext};
+use super::super::decision::{Decision, DecisionContext};
 use crate::task::FailureReason;
 use crate::time::Tick;
 use crate::world::strip::StripId;

@@ -1,6 +1,6 @@
 //! The shortest transition with which a strip is imaged, found by flying it.
 
-use super::Allowance;
+use super::experience::Allowance;
 use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::task::Task;

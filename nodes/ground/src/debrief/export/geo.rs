@@ -10,24 +10,11 @@ use swath_msgs::swath_msgs as msg;
 use super::Track;
 use crate::debrief::places::{Place, cut_at_antimeridian, strip_places};
 use crate::debrief::recorded::Recorded;
+use crate::requests::json::status_json;
 
 /// Each strip with where it stands at the end.
 pub fn write_strips(recorded: &Recorded, folder: &Path) -> Result<()> {
-    let feature = |event: &&msg::StripStatus| {
-        let strip = &event.strip;
-        let properties = json!({
-            "id": strip.id,
-            "name": strip.name,
-            "client_ref": event.client_ref,
-            "priority": strip.priority,
-            "acquisition_speed_m_s": strip.acquisition_speed,
-            "state": state_name(event.state),
-            "attempts": event.attempts,
-            "reward": event.reward,
-            "reason": event.reason,
-        });
-        feature(&strip_places(&recorded.model, strip), properties)
-    };
+    let feature = |event: &&msg::StripStatus| feature(&strip_places(&recorded.model, &event.strip), status_json(event));
     write(folder, "strips.geojson", recorded.last_events().values().map(feature).collect())
 }
 
@@ -52,25 +39,4 @@ fn write(folder: &Path, file: &str, features: Vec<Value>) -> Result<()> {
     let path = folder.join(file);
     let text = json!({ "type": "FeatureCollection", "features": features }).to_string();
     fs::write(&path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// A state of a strip request in words.
-#[must_use]
-pub fn state_name(state: u8) -> &'static str {
-    match state {
-        msg::StripStatus::STATE_RECEIVED => "received",
-        msg::StripStatus::STATE_REJECTED => "rejected",
-        msg::StripStatus::STATE_HELD => "held",
-        msg::StripStatus::STATE_ACCEPTED => "accepted",
-        msg::StripStatus::STATE_SCHEDULED => "scheduled",
-        msg::StripStatus::STATE_EXECUTING => "executing",
-        msg::StripStatus::STATE_COMPLETED => "completed",
-        msg::StripStatus::STATE_CANCELLED_BY_USER => "cancelled by user",
-        msg::StripStatus::STATE_CANCELLED_BY_SYSTEM => "cancelled by system",
-        msg::StripStatus::STATE_EXPIRED => "expired",
-        msg::StripStatus::STATE_FAILED => "failed",
-        msg::StripStatus::STATE_SUPERSEDED => "superseded",
-        msg::StripStatus::STATE_FULFILLED_BY_LINK => "fulfilled by link",
-        _ => "unknown",
-    }
 }

@@ -6,9 +6,9 @@ use swath_ros::graph;
 use swath_sim::config::RAD_S_PER_RPM;
 
 use crate::debrief::export::Track;
-use crate::debrief::export::geo::state_name;
 use crate::debrief::places::{Place, strip_places};
 use crate::debrief::recorded::Recorded;
+use crate::requests::json::state_name;
 
 /// Time between points of the ground track [s].
 const TRACK_STEP_S: f64 = 10.0;

@@ -1,0 +1,58 @@
+//! An order: what is asked for, by whom, under which names and conditions.
+
+use swath_sim::world::strip::StripRequest;
+
+/// A request with the names that its submitter gave it, and its conditions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// Submitter's own reference; empty without one.
+    pub client_ref: String,
+    /// Who submits.
+    pub submitter: String,
+    /// Name for people.
+    pub name: String,
+    /// What is asked for.
+    pub request: StripRequest,
+    /// Simulated time before which imaging may not start [ns since 1970-01-01 UTC]; 0 for any.
+    pub valid_from_ns: u64,
+    /// Simulated time after which imaging may not end [ns since 1970-01-01 UTC]; 0 for any.
+    pub valid_until_ns: u64,
+    /// Whether it waits for an operator's approval.
+    pub hold_for_approval: bool,
+    /// Attempts before it fails; 0 for the mission's default.
+    pub max_attempts: u32,
+}
+
+/// Submitter of the strips that a mission knows from the start.
+pub const MISSION: &str = "mission";
+
+impl Order {
+    /// A request of the mission's own, without conditions.
+    #[must_use]
+    pub fn new(client_ref: String, name: String, request: StripRequest) -> Self {
+        Self {
+            client_ref,
+            submitter: MISSION.to_owned(),
+            name,
+            request,
+            valid_from_ns: 0,
+            valid_until_ns: 0,
+            hold_for_approval: false,
+            max_attempts: 0,
+        }
+    }
+
+    /// Whether it asks for the same as one that is known, of which, if it is bidirectional, the other direction may have
+    /// been kept.
+    #[must_use]
+    pub fn is_for_the_same_as(&self, known: &Self) -> bool {
+        self == known
+            || (self.request.bidirectional && *known == Self { request: self.request.reversed(), ..self.clone() })
+    }
+
+    /// Simulated times between which it may be imaged [ns since 1970-01-01 UTC].
+    #[must_use]
+    pub fn validity_ns(&self) -> (u64, u64) {
+        (self.valid_from_ns, if self.valid_until_ns == 0 { u64::MAX } else { self.valid_until_ns })
+    }
+}

@@ -1,0 +1,9 @@
+//! Power, data and momentum: what the satellite lives on besides its attitude.
+
+mod account;
+pub mod battery;
+pub mod config;
+pub mod momentum;
+pub mod storage;
+
+pub use account::{Activity, Failure, Imager, Onboard, ResourceState};
