@@ -61,8 +61,7 @@ pub fn access(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> {
     let range_max: f64 = meta.number("maximum_range_m")?;
     let last = Tick((meta.number("duration_s")? / period.seconds()).round() as u64);
     let tick = |time_s: f64| Tick((time_s / period.seconds()).round() as u64);
-    let mut checks =
-        [Check::new("windows", 0.0), Check::new("elevation rad", 1e-9), Check::new("range m", 1e-3)];
+    let mut checks = [Check::new("windows", 0.0), Check::new("elevation rad", 1e-9), Check::new("range m", 1e-3)];
     let mut rows = 0;
     for recorded in data.get::<Vec<Recorded>>("stations")? {
         let mut view = View::new(&recorded.site.station(0.0, range_max), &config, period);

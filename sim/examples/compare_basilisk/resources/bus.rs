@@ -11,13 +11,9 @@ use super::{Check, Comparison};
 
 /// Wheels without and with recovery.
 fn both_wheels(meta: &Input<'_>) -> Result<[WheelPower; 2]> {
-    let (base_w, motor_efficiency) =
-        (meta.number("base_power_W")?, meta.number("elec_to_mech_efficiency")?);
+    let (base_w, motor_efficiency) = (meta.number("base_power_W")?, meta.number("elec_to_mech_efficiency")?);
     let with = |recovery| WheelPower { base_w, motor_efficiency, recovery };
-    Ok([
-        with(meta.number("mech_to_elec_efficiency_no_regen")?),
-        with(meta.number("mech_to_elec_efficiency_regen")?),
-    ])
+    Ok([with(meta.number("mech_to_elec_efficiency_no_regen")?), with(meta.number("mech_to_elec_efficiency_regen")?)])
 }
 
 /// Power that three wheels draw, as Basilisk signs it [W].

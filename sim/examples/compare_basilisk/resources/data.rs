@@ -146,8 +146,7 @@ pub fn data(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> {
         bail!("unknown storage `{}`", storage.kind);
     }
     let parts = storage.partitions.iter().map(|it| (it.clone(), storage.initial.get(it).copied().unwrap_or(0)));
-    let mut unit =
-        Unit { parts: parts.collect(), capacity: storage.capacity_bits, simple: storage.kind == "simple" };
+    let mut unit = Unit { parts: parts.collect(), capacity: storage.capacity_bits, simple: storage.kind == "simple" };
     let names: Vec<String> = meta.get("partition_names")?;
     let ticks = data.ticks(period)?;
     let (access, rates, sent_names): (Vec<u8>, Vec<f64>, Vec<String>) =

@@ -150,8 +150,7 @@ impl ClosedLoop {
         // Basilisk's servo takes time 0 for its first call: it integrates nothing on its first two.
         let dt = if self.now.0 < 2 { 0.0 } else { self.model.period.seconds() };
         let (law, plant, body) = (&self.model.law, &self.model.plant, &self.body);
-        self.command =
-            law.torque(plant, &error, &body.omega_BN_B, &body.wheel_speed, &mut self.integral, dt);
+        self.command = law.torque(plant, &error, &body.omega_BN_B, &body.wheel_speed, &mut self.integral, dt);
         let (Some(field), Some(torquers)) = (&self.field, &self.torquers) else { return };
         self.field_N = field.field_N(&r_BN_N, self.earth.cos_sin(self.now));
         let field_B = mrp::to_dcm(&self.body.sigma_BN) * self.field_N;
@@ -239,8 +238,7 @@ pub fn gravity_tumble(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> 
     let ticks = data.ticks(period)?;
     let (sigmas, omegas, torques): (Rows, Rows, Rows) =
         (data.get("sigma_BN")?, data.get("omega_BN_B")?, data.get("gg_torque_B")?);
-    let mut checks =
-        [Check::new("sigma", 1e-8), Check::new("omega rad/s", 1e-8), Check::new("gravity N m", 1e-9)];
+    let mut checks = [Check::new("sigma", 1e-8), Check::new("omega rad/s", 1e-8), Check::new("gravity N m", 1e-9)];
     let (mut now, mut last) = (Tick(0), Vector3::zeros());
     for (row, &tick) in ticks.iter().enumerate() {
         while now < tick {

@@ -154,7 +154,11 @@ impl Onboard {
             }),
             antenna_B: Vector3::from(config.antenna_axis_b).normalize(),
             cos_antenna: libm::cos(config.antenna_half_angle_deg.to_radians()),
-            gradient: if config.gravity_gradient { 3.0 * mu / (orbit.radius * orbit.radius * orbit.radius) } else { 0.0 },
+            gradient: if config.gravity_gradient {
+                3.0 * mu / (orbit.radius * orbit.radius * orbit.radius)
+            } else {
+                0.0
+            },
             dt,
             bits_a_tick: (bits(config.imager_rate_bps, dt), bits(config.transmitter_rate_bps, dt)),
             views: stations.iter().map(|it| View::new(it, &model.config, model.period)).collect(),

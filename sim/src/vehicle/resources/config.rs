@@ -355,10 +355,16 @@ mod tests {
         assert_eq!(refused("panel_area_m2 = -1.0"), "resources.panel_area_m2 is -1, outside 0 to 1000");
         assert_eq!(refused("panel_efficiency = 1.1"), "resources.panel_efficiency is 1.1, outside 0 to 1");
         assert_eq!(refused("battery_floor = 1.5"), "resources.battery_floor is 1.5, outside 0 to 1");
-        assert_eq!(refused("panel_normal_b = [0.0, 0.0, 0.0]"), "resources.panel_normal_b is 0, outside 0.000001 to 1000000");
+        assert_eq!(
+            refused("panel_normal_b = [0.0, 0.0, 0.0]"),
+            "resources.panel_normal_b is 0, outside 0.000001 to 1000000"
+        );
         assert_eq!(refused("bus_w = nan"), "resources.bus_w is NaN, outside 0 to 100000");
         assert!(refused("stations = [\"atlantis\"]").starts_with("no station `atlantis` in the catalogue"));
-        assert_eq!(refused("stations = []"), "resources.transmitter_rate_bps is not 0, but there are no stations to send to");
+        assert_eq!(
+            refused("stations = []"),
+            "resources.transmitter_rate_bps is not 0, but there are no stations to send to"
+        );
         assert!(refused("disturbance_nm = [0.0, 1.0, 0.0]").starts_with("resources.disturbance_nm is 1, outside"));
         let own = "[[own_stations]]\nname = \"a\"\nlatitude_deg = 0.0\nlongitude_deg = 0.0\nmask_deg = 95.0";
         assert_eq!(refused(own), "station.mask_deg is 95, outside 0 to 89");

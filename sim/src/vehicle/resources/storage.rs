@@ -55,14 +55,7 @@ impl Storage {
     /// An empty storage of a capacity [bit].
     #[must_use]
     pub fn new(capacity: u64) -> Self {
-        Self {
-            capacity,
-            stored: 0,
-            recording: None,
-            waiting: Vec::new(),
-            sending: None,
-            books: DataBooks::default(),
-        }
+        Self { capacity, stored: 0, recording: None, waiting: Vec::new(), sending: None, books: DataBooks::default() }
     }
 
     /// Takes what the imager made of a strip in a tick, all of it or nothing. Says whether there was room.
