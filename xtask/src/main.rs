@@ -1,4 +1,4 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|soak`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|soak|web`.
 
 mod bench;
 mod examples;
@@ -8,6 +8,7 @@ mod prerequisites;
 mod process;
 mod soak;
 mod venv;
+mod web;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,8 @@ usage: cargo xtask COMMAND
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
+  web              test and build the console's page with npm, from its sources into
+                   the files that the program holds
 ";
 
 fn main() -> ExitCode {
@@ -58,6 +61,7 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("lint") => lint(&root, rest),
         Some("bench") => bench(&root, rest),
         Some("soak") => soak(&root, rest),
+        Some("web") => web(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
             Ok(())
@@ -125,6 +129,13 @@ fn lint(root: &Path, args: &[OsString]) -> Result<()> {
 fn soak(root: &Path, args: &[OsString]) -> Result<()> {
     setup(root, true)?;
     soak::run(root, args)
+}
+
+fn web(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("web takes no arguments\n\n{USAGE}");
+    }
+    web::build(root)
 }
 
 fn repository_root() -> Result<PathBuf> {

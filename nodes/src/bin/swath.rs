@@ -25,6 +25,8 @@ enum Command {
     Strips(operate::StripsArgs),
     /// Say what the planner may do by itself, and decide on what it proposes.
     Planner(operate::PlannerArgs),
+    /// Show a flying or a recorded mission as a page in a browser.
+    Console(swath_console::ConsoleArgs),
     /// Fly a recorded mission again, with the same or another planner, and compare.
     Refly(refly::ReflyArgs),
     /// Tell of a recorded mission in one page: map, timeline, plots, decisions.
@@ -45,6 +47,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Launch(args) => launch::run(&args, &POLICIES)?,
         Command::Strips(args) => operate::run_strips(&args)?,
         Command::Planner(args) => operate::run_planner(&args)?,
+        Command::Console(args) => swath_console::run(&args)?,
         Command::Refly(args) => return args.run(&POLICIES),
         Command::Report(args) => return args.run(),
         Command::Export(args) => return args.run(),

@@ -20,18 +20,21 @@ interface PlotProps {
 }
 
 const HEIGHT = 92;
+/** Width of a plot's name, which stands beside its axis [px]. */
+const LABEL = 18;
 
 function options(title: string, curves: Curve[], width: number): uPlot.Options {
   const grid = { stroke: "#1b2b3a", width: 1 };
   return {
     width,
     height: HEIGHT,
+    padding: [8, 0, 4, 0],
     cursor: { drag: { setScale: false, x: false, y: false }, sync: { key: "time" } },
     legend: { show: true, live: true },
     scales: { x: { time: true, auto: false, range: () => span.value.map((t) => t / 1000) as [number, number] } },
     axes: [
       { show: false },
-      { stroke: "#9fb4c7", grid, size: GUTTER, label: title, labelSize: 18, labelFont: "11px system-ui", font: "11px system-ui" },
+      { stroke: "#9fb4c7", grid, size: GUTTER - LABEL, label: title, labelSize: LABEL, labelFont: "11px system-ui", font: "11px system-ui" },
     ],
     series: [
       { label: "time", value: (_, value) => (value == null ? "" : stamp(value * 1000)) },

@@ -74,7 +74,11 @@ export class World {
         break;
       case "change": {
         const strip = this.strips.get(fact.strip);
-        if (strip) insert(strip.changes, fact);
+        if (!strip) break;
+        const known = strip.changes.findIndex((it) => it.t === fact.t && it.state === fact.state);
+        // More is known of the same change.
+        if (known >= 0) strip.changes[known] = fact;
+        else insert(strip.changes, fact);
         break;
       }
       case "point":
