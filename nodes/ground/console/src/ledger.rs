@@ -145,7 +145,7 @@ impl Ledger {
             self.tell_at(stamp, &facts::refused(status));
             return;
         }
-        match self.told.insert(id, (status.state, stamp.clone())) {
+        match self.told.insert(id, (status.state, *stamp)) {
             None => self.tell_at(stamp, &facts::strip(status)),
             // A list that was asked for while the change was under way.
             Some((state, at)) if state == status.state && at == *stamp => return,
@@ -276,7 +276,6 @@ impl Ledger {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use serde_json::{Value, json};
 
