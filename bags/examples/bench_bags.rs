@@ -1,7 +1,8 @@
 //! Measures writing, reading, recording and playing; prints one JSON object.
 //!
 //! Recording takes two further processes: `bench_bags record DIR` and `bench_bags publish RATE N`;
-//! playing, alone with `bench_bags play`, takes `bench_bags play BAG RATE` and `bench_bags listen N`.
+//! playing, alone with `bench_bags play`, takes `bench_bags play BAG RATE` and `bench_bags listen N`. With CycloneDDS on
+//! the other side, in Python, `bench_bags cyclone` measures both.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
 
 use std::{
@@ -36,6 +37,8 @@ const RATE: u64 = 50_000;
 const PACED: u64 = 10_000;
 /// A domain of its own, so that nothing else is recorded.
 const DOMAIN: &str = "139";
+/// Python with the packages of `tests/requirements.txt`, as the tests find it.
+const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../.venv/bin/python");
 
 fn main() {
     let args: Vec<String> = env::args().skip(1).collect();
@@ -47,11 +50,12 @@ fn main() {
             let messages: Vec<_> = (0..1024).map(message).collect();
             measure_playing(temp.path(), &messages)
         }
+        ["cyclone"] => measure_cyclone(tempfile::tempdir().unwrap().path()),
         ["record", dir] => record(Path::new(dir)),
         ["publish", rate, n] => publish(rate.parse().unwrap(), n.parse().unwrap()),
         ["play", bag, rate] => play(Path::new(bag), rate.parse().unwrap()),
         ["listen", n] => listen(n.parse().unwrap()),
-        _ => panic!("usage: bench_bags [record DIR | publish RATE N | play [BAG RATE] | listen N]"),
+        _ => panic!("usage: bench_bags [cyclone | record DIR | publish RATE N | play [BAG RATE] | listen N]"),
     };
     println!("{result}");
 }
@@ -82,10 +86,52 @@ fn measure() -> Value {
     result["bag_write_zstd_MB_per_s"] = json!(zstd.round());
     result["bag_read_msgs_per_s"] = json!(read.round());
     result["bag_60000_topics_s"] = json!(many);
-    if let (Value::Object(all), Value::Object(played)) = (&mut result, measure_playing(temp.path(), &messages)) {
-        all.extend(played);
+    for part in [measure_playing(temp.path(), &messages), measure_cyclone(temp.path())] {
+        if let (Value::Object(all), Value::Object(part)) = (&mut result, part) {
+            all.extend(part);
+        }
     }
     result
+}
+
+/// Bursts of a CycloneDDS writer recorded, and a bag of 50 000 messages/s played to a CycloneDDS reader of depth 10, at the
+/// bag's rate and as fast as it goes. Nothing without the Python of the tests.
+fn measure_cyclone(dir: &Path) -> Value {
+    let python = env::var("SWATH_PYTHON").unwrap_or_else(|_| PYTHON.to_owned());
+    if !Path::new(&python).exists() {
+        return json!({});
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/cyclone.py");
+    let peer = |role: &str| {
+        let mut command = Command::new(&python);
+        command.arg(&script).args([role, DOMAIN, &RECORDED.to_string()]);
+        command.stdout(Stdio::piped()).spawn().unwrap()
+    };
+    let recorder = this(&["record", dir.join("bursts").to_str().unwrap()]);
+    last_line(peer("write"));
+    let recorded = last_line(recorder);
+    let bag = dir.join("steady");
+    let messages: Vec<_> = (0..1024).map(message).collect();
+    write(&bag, Compression::Zstd, &messages, RECORDED, 1_000_000_000 / RATE);
+    let play = |rate: &str| {
+        let reader = peer("read");
+        let played = last_line(this(&["play", bag.to_str().unwrap(), rate]));
+        last_line(reader);
+        played
+    };
+    let (steady, fast) = (play("1"), play("0"));
+    json!({
+        "record_bursts_lost": RECORDED - recorded["messages"].as_u64().unwrap(),
+        "play_cyclone_late_p99_ms": steady["late_p99_ms"],
+        "play_cyclone_refused": RECORDED - steady["published"].as_u64().unwrap(),
+        "play_cyclone_msgs_per_s": (RECORDED as f64 / fast["seconds"].as_f64().unwrap()).round(),
+    })
+}
+
+/// This program in another role.
+fn this(args: &[&str]) -> std::process::Child {
+    let mut command = Command::new(env::current_exe().unwrap());
+    command.args(args).env("ROS_DOMAIN_ID", DOMAIN).stdout(Stdio::piped()).spawn().unwrap()
 }
 
 /// A million messages as fast as they go, and a thousand a second at their own pace.
@@ -151,12 +197,8 @@ fn many_topics(dir: &Path) -> f64 {
 
 /// A publisher and a recorder, each in its process.
 fn record_over_dds(dir: &Path) -> Value {
-    let role = |args: &[&str]| {
-        let mut command = Command::new(env::current_exe().unwrap());
-        command.args(args).env("ROS_DOMAIN_ID", DOMAIN).stdout(Stdio::piped()).spawn().unwrap()
-    };
-    let recorder = role(&["record", dir.to_str().unwrap()]);
-    let publisher = role(&["publish", &RATE.to_string(), &RECORDED.to_string()]);
+    let recorder = this(&["record", dir.to_str().unwrap()]);
+    let publisher = this(&["publish", &RATE.to_string(), &RECORDED.to_string()]);
     let sent: Value = last_line(publisher);
     let recorded: Value = last_line(recorder);
     let in_bag = recorded["messages"].as_u64().unwrap();
@@ -170,12 +212,8 @@ fn record_over_dds(dir: &Path) -> Value {
 
 /// A player and a listener, each in its process; what both say.
 fn play_over_dds(bag: &Path, rate: f64, messages: u64) -> (Value, Value) {
-    let role = |args: &[&str]| {
-        let mut command = Command::new(env::current_exe().unwrap());
-        command.args(args).env("ROS_DOMAIN_ID", DOMAIN).stdout(Stdio::piped()).spawn().unwrap()
-    };
-    let listener = role(&["listen", &messages.to_string()]);
-    let player = role(&["play", bag.to_str().unwrap(), &rate.to_string()]);
+    let listener = this(&["listen", &messages.to_string()]);
+    let player = this(&["play", bag.to_str().unwrap(), &rate.to_string()]);
     (last_line(player), last_line(listener))
 }
 
@@ -265,7 +303,12 @@ fn play(bag: &Path, rate: f64) -> Value {
     };
     let player = Player::start(options, &RosArgs::default()).unwrap();
     let summary = player.run(&Shutdown::default(), |_| ()).unwrap();
-    json!({ "published": summary.published, "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3, "cpu_s": cpu_s() })
+    json!({
+        "published": summary.published,
+        "seconds": summary.wall.as_secs_f64(),
+        "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3,
+        "cpu_s": cpu_s(),
+    })
 }
 
 /// Takes messages until none has come for ten seconds: how many a second, how many were lost, and how much later than the

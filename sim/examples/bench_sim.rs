@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use swath_sim::config::SimConfig;
+use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
 use swath_sim::model::Model;
@@ -17,7 +18,6 @@ use swath_sim::rng;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
-use swath_sim::vehicle::resources::config::{Profile, ResourcesConfig};
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripRequest;

@@ -6,7 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
 use crate::time::TickPeriod;
-use crate::vehicle::resources::config::ResourcesConfig;
+
+pub(crate) mod range;
+pub mod resources;
+pub mod station;
+
+pub(crate) use range::{in_range, ordered};
+use resources::ResourcesConfig;
 
 /// Everything that a mission's physics and planning problem depend on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -273,16 +279,6 @@ fn possible_body([x, y, z]: [f64; 3]) -> Result<(), SimError> {
         }
     }
     Ok(())
-}
-
-/// Refuses a value outside [min, max], and NaN.
-pub(crate) fn in_range(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), SimError> {
-    if (min..=max).contains(&value) { Ok(()) } else { Err(SimError::OutOfRange { name, value, min, max }) }
-}
-
-/// Refuses a range that runs backwards.
-pub(crate) fn ordered(name: &'static str, min: f64, max: f64) -> Result<(), SimError> {
-    if min <= max { Ok(()) } else { Err(SimError::EmptyRange { name, min, max }) }
 }
 
 #[cfg(test)]

@@ -116,7 +116,7 @@ pub enum StripError {
         max_m_s: f64,
     },
     /// A strip that is too short or too long.
-    #[error("length {length_km} km is outside {min_km} to {max_km} km")]
+    #[error("length {length_km:.3} km is outside {min_km} to {max_km} km")]
     Length {
         /// Great-circle length [km].
         length_km: f64,

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::model::Model;
-use crate::planner::{Decision, DecisionContext, Planner, PlannerError};
+use crate::planner::{Decision, DecisionContext, Planner, PlannerError, Shield};
 use crate::requests::catalogue::Candidate;
-use crate::task::{SettledTask, TaskRecord};
+use crate::task::{Duty, SettledTask, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::flight::{Flight, Situation};
+use crate::vehicle::resources::{Failure, Onboard};
 
 /// Whoever keeps the requests of a mission.
 pub trait RequestKeeper {
@@ -16,6 +19,17 @@ pub trait RequestKeeper {
 
     /// A task has ended: says its reward.
     fn settle(&mut self, record: &TaskRecord) -> f64;
+}
+
+/// Images that came to the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Delivered {
+    /// How many.
+    pub strips: u64,
+    /// Sum of the priorities of the strips that they fulfilled.
+    pub reward: f64,
+    /// Times that the battery was empty or a wheel over its limit when a task ended in which neither was before.
+    pub failures: u64,
 }
 
 /// A satellite, whoever keeps its requests, and a clock.
@@ -31,6 +45,10 @@ pub struct Mission<K> {
     candidates: Vec<Candidate>,
     /// Time from a situation to the start of the task decided on it [ticks].
     planning_delay: u32,
+    delivered: Delivered,
+    shield: Option<Shield>,
+    /// What failed and is not mended yet.
+    safe_mode: Option<Failure>,
 }
 
 impl<K: RequestKeeper> Mission<K> {
@@ -39,8 +57,21 @@ impl<K: RequestKeeper> Mission<K> {
     pub fn new(model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
         let situation = flight.situation();
         let (task, previous, candidates) = (0, None, Vec::new());
-        let mut mission =
-            Self { model, flight, keeper, horizon, task, situation, previous, candidates, planning_delay: 0 };
+        let shield = Shield::new(&model);
+        let mut mission = Self {
+            model,
+            flight,
+            keeper,
+            horizon,
+            task,
+            situation,
+            previous,
+            candidates,
+            planning_delay: 0,
+            delivered: Delivered::default(),
+            shield,
+            safe_mode: None,
+        };
         mission.refresh();
         mission
     }
@@ -92,6 +123,24 @@ impl<K: RequestKeeper> Mission<K> {
         &self.keeper
     }
 
+    /// What came to the ground so far.
+    #[must_use]
+    pub fn delivered(&self) -> &Delivered {
+        &self.delivered
+    }
+
+    /// What failed and is not mended yet: until it is, the satellite only sees to that.
+    #[must_use]
+    pub fn safe_mode(&self) -> Option<Failure> {
+        self.safe_mode
+    }
+
+    /// Power, data and momentum, where they have bounds.
+    #[must_use]
+    pub fn onboard(&self) -> Option<&Onboard> {
+        self.flight.spacecraft.onboard()
+    }
+
     /// Changes something about the requests, and looks again at what may be imaged.
     pub fn change<R>(&mut self, change: impl FnOnce(&mut K) -> R) -> R {
         let result = change(&mut self.keeper);
@@ -114,6 +163,7 @@ impl<K: RequestKeeper> Mission<K> {
         let task = decision.to_task(&self.context())?;
         let record = self.flight.fly_number(self.task, task, self.planning_delay, until);
         let reward = self.keeper.settle(&record);
+        self.settle_resources(&record, reward);
         self.task += 1;
         self.previous = Some(record.clone());
         self.refresh();
@@ -128,8 +178,24 @@ impl<K: RequestKeeper> Mission<K> {
         if self.over() {
             return Ok(None);
         }
-        let decision = planner.decide(&self.context())?;
+        let decision = self.decide(planner)?;
         self.fly(decision, until.min(self.horizon)).map(Some)
+    }
+
+    /// What comes next: safe mode decides, or the shield, or the planner within what the shield allows.
+    ///
+    /// # Errors
+    /// When the planner gave no usable decision.
+    pub fn decide(&self, planner: &mut dyn Planner) -> Result<Decision, PlannerError> {
+        if let Some(decision) = self.safe_decision() {
+            return Ok(decision);
+        }
+        let context = self.context();
+        let Some(shield) = &self.shield else { return planner.decide(&context) };
+        match shield.before(&context) {
+            Some(decision) => Ok(decision),
+            None => Ok(shield.check(&context, planner.decide(&context)?)),
+        }
     }
 
     /// Decides and flies to the mission's end, handing each task to `each`.
@@ -143,11 +209,47 @@ impl<K: RequestKeeper> Mission<K> {
         Ok(())
     }
 
+    /// Keeps or throws away what was imaged, and counts what came down and what failed in a task.
+    fn settle_resources(&mut self, record: &TaskRecord, reward: f64) {
+        let momentum = self.flight.spacecraft.body.wheel_speed.amax() * self.model.plant.wheel_inertia;
+        let Some(onboard) = self.flight.spacecraft.onboard_mut() else { return };
+        if record.strip.is_some() {
+            onboard.settle_image(if record.success() { reward } else { 0.0 });
+        }
+        for file in onboard.take_delivered() {
+            self.delivered.strips += 1;
+            self.delivered.reward += file.worth;
+        }
+        let config = onboard.config();
+        let mended = onboard.battery().level() >= config.battery_floor && momentum <= config.wheel_momentum_max_nms;
+        // The tick at which a task begins belongs to the one before it.
+        let failed = onboard.state().failure.filter(|(tick, _)| *tick > record.start);
+        let long_ago = onboard.state().failure.is_none_or(|(tick, _)| tick < record.end);
+        if let Some((_, failure)) = failed {
+            self.delivered.failures += u64::from(self.safe_mode.is_none());
+            self.safe_mode = Some(failure);
+        }
+        if mended && long_ago {
+            self.safe_mode = None;
+        }
+    }
+
+    /// What safe mode does next; nothing while all is well.
+    fn safe_decision(&self) -> Option<Decision> {
+        let failure = self.safe_mode?;
+        let thrusters = self.onboard().is_some_and(Onboard::has_thrusters);
+        let duty = if failure == Failure::WheelMomentum && thrusters { Duty::Desaturate } else { Duty::Charge };
+        Some(Decision::Serve { duty, ticks: self.model.period.ticks_ceil(SAFE_MODE_S).max(1) })
+    }
+
     fn refresh(&mut self) {
         self.situation = self.flight.situation();
         self.keeper.offer(self.task, &self.situation, &mut self.candidates);
     }
 }
+
+/// How long safe mode sees to a failure before it looks again [s].
+const SAFE_MODE_S: f64 = 60.0;
 
 /// How far past the mission's end windows are sought [orbits], so that its end cannot be seen in the observation.
 const WINDOW_MARGIN_ORBITS: f64 = 1.5;

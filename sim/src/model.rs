@@ -1,11 +1,11 @@
 //! A configuration turned into SI constants, shared by everything that flies it.
 
 use crate::config::SimConfig;
+use crate::config::station::Station;
 use crate::error::SimError;
 use crate::time::TickPeriod;
 use crate::vehicle::control::ControlLaw;
 use crate::vehicle::dynamics::Plant;
-use crate::world::stations::Station;
 use crate::world::turn::{Turn, earth_turn};
 
 /// A validated configuration with what follows from it.

@@ -26,6 +26,25 @@ pub enum Task {
         /// Length [ticks].
         ticks: u32,
     },
+    /// See to power, data or momentum.
+    Serve {
+        /// What is done.
+        duty: Duty,
+        /// Length [ticks].
+        ticks: u32,
+    },
+}
+
+/// What the satellite does for itself; only where its resources have bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Duty {
+    /// Point the solar array at the Sun.
+    Charge,
+    /// Point a body-fixed antenna at the Earth's centre, and send in contact.
+    Downlink,
+    /// Point the solar array at the Sun, and take momentum out of the wheels by thrusters.
+    Desaturate,
 }
 
 impl Task {
@@ -34,16 +53,16 @@ impl Task {
     pub fn ticks(&self) -> u32 {
         match *self {
             Self::Image { t_pre, t_acq, .. } => t_pre + t_acq,
-            Self::Wait { ticks } => ticks,
+            Self::Wait { ticks } | Self::Serve { ticks, .. } => ticks,
         }
     }
 
-    /// The strip that it images; `None` for a wait.
+    /// The strip that it images; `None` for a task without one.
     #[must_use]
     pub fn strip(&self) -> Option<StripId> {
         match *self {
             Self::Image { id, .. } => Some(id),
-            Self::Wait { .. } => None,
+            Self::Wait { .. } | Self::Serve { .. } => None,
         }
     }
 }
@@ -86,7 +105,7 @@ pub struct TaskRecord {
     pub start: Tick,
     /// Tick at which it ended.
     pub end: Tick,
-    /// The strip, or `None` for a wait.
+    /// The strip, or `None` for a task without one.
     pub strip: Option<StripId>,
     /// Transition time T_pre [ticks]; 0 for a wait.
     pub t_pre: u32,
@@ -102,7 +121,7 @@ impl TaskRecord {
     pub fn new(number: u64, task: &Task, start: Tick, end: Tick, outcome: TaskOutcome) -> Self {
         let (t_pre, t_acq) = match *task {
             Task::Image { t_pre, t_acq, .. } => (t_pre, t_acq),
-            Task::Wait { .. } => (0, 0),
+            Task::Wait { .. } | Task::Serve { .. } => (0, 0),
         };
         Self { task: number, start, end, strip: task.strip(), t_pre, t_acq, outcome }
     }
@@ -142,7 +161,7 @@ pub struct Totals {
     pub t_pre_ticks: u64,
     /// Ticks spent imaging in attempts.
     pub t_acq_ticks: u64,
-    /// Ticks spent waiting.
+    /// Ticks spent waiting, and on power, data and momentum.
     pub wait_ticks: u64,
     /// Attempts that failed for attitude.
     pub failed_attitude: u64,

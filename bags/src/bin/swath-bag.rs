@@ -7,7 +7,7 @@ use std::{
 };
 
 use clap::{Args, Parser, Subcommand};
-use swath_bags::{chain, cli::Command};
+use swath_bags::{chain, cli::Command, say};
 use swath_ros::RosArgs;
 
 /// Record, play, inspect and mend rosbag2 bags
@@ -49,7 +49,7 @@ impl Handed {
             Ok(path) => path.with_file_name("swath"),
             Err(error) => return format!("cannot find swath: {error}"),
         };
-        eprintln!("swath-bag {name} runs `swath {name}`");
+        say(&format!("swath-bag {name} runs `swath {name}`"));
         let error = process::Command::new(&program).arg(name).args(self.words).exec();
         format!("cannot run {}: {error}", program.display())
     }
@@ -59,7 +59,7 @@ fn main() -> ExitCode {
     match run() {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error}");
+            say(&format!("error: {error}"));
             ExitCode::FAILURE
         }
     }

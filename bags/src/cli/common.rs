@@ -3,7 +3,6 @@
 use std::{
     collections::BTreeMap,
     fs,
-    io::{self, Write},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -13,6 +12,7 @@ use clap::Args;
 use crate::{
     error::{BagError, Result},
     file::source::{MAX_RECORD_BYTES, ReadOptions},
+    out::{print, say},
     qos::QosOverride,
 };
 
@@ -66,19 +66,9 @@ pub(super) fn overrides(path: Option<&Path>) -> Result<BTreeMap<String, QosOverr
 /// The exit code of a command that has done its work; tells what was lost on the way.
 pub(super) fn done(faults: &[String]) -> ExitCode {
     for fault in faults {
-        eprintln!("warning: {fault}");
+        say(&format!("warning: {fault}"));
     }
     if faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(WITH_LOSS) }
-}
-
-/// Prints a text to stdout.
-pub(super) fn print(text: &str) -> Result<()> {
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|source| BagError::Io {
-        action: "write to",
-        path: "standard output".into(),
-        source,
-    })
 }
 
 /// Prints a value as one line of JSON.

@@ -4,10 +4,11 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 
-use super::common::{ReadArgs, bags, done, print};
+use super::common::{ReadArgs, bags, done};
 use crate::{
     error::Result,
     ops::{convert::convert, reindex::reindex},
+    out::print,
 };
 
 /// Arguments of `convert`.

@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 
-use super::common::{ReadArgs, WITH_LOSS, done, print, print_json};
+use super::common::{ReadArgs, WITH_LOSS, done, print_json};
 use crate::{
     error::{BagError, Result},
     file::chunk::Compression,
@@ -12,6 +12,7 @@ use crate::{
         copy::{Copied, filter, merge},
         recover::recover,
     },
+    out::print,
     reader::{Bag, Filter, TopicPattern},
     writer::{BagOptions, BagSummary},
 };

@@ -5,7 +5,7 @@ use std::{io, path::PathBuf, process::ExitCode};
 use clap::Args;
 
 use super::{
-    common::{ReadArgs, done, print, print_json},
+    common::{ReadArgs, done, print_json},
     copy::Selection,
 };
 use crate::{
@@ -15,6 +15,7 @@ use crate::{
         info::{info, info_in_detail},
         validate::validate,
     },
+    out::print,
     reader::Bag,
 };
 

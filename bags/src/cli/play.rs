@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     error::{Result, chain},
+    out::say,
     play::{End, LAST_MESSAGES, PlayOptions, Player},
     reader::TopicPattern,
 };
@@ -108,7 +109,7 @@ impl PlayArgs {
             "late_p99_ms": summary.late_p99.as_secs_f64() * 1e3,
         }))?;
         if summary.refused > 0 {
-            eprintln!("{} messages could not be published", summary.refused);
+            say(&format!("{} messages could not be published", summary.refused));
         }
         let code = done(&summary.faults);
         Ok(if summary.refused == 0 { code } else { ExitCode::from(WITH_LOSS) })

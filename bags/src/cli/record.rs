@@ -21,6 +21,7 @@ use super::{
 use crate::{
     error::{BagError, Result},
     file::chunk::Compression,
+    out::say,
     preset::Preset,
     reader::TopicPattern,
     record::{RecordOptions, Recorder},
@@ -138,7 +139,7 @@ impl RecordArgs {
             "bytes": summary.bytes, "files": summary.files,
         }))?;
         if summary.lost > 0 {
-            eprintln!("{} messages were lost", summary.lost);
+            say(&format!("{} messages were lost", summary.lost));
             return Ok(ExitCode::from(WITH_LOSS));
         }
         Ok(ExitCode::SUCCESS)
@@ -205,7 +206,7 @@ impl RecordArgs {
             (mode, format) => {
                 options.compression = format.unwrap_or_default();
                 let name = options.compression.mcap_name();
-                eprintln!("--compression-mode {mode}: chunks are compressed with {name}, not each {mode}");
+                say(&format!("--compression-mode {mode}: chunks are compressed with {name}, not each {mode}"));
                 Ok(options)
             }
         }

@@ -1,4 +1,20 @@
 //! What can be done with a finished bag.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use swath_bags::{Bag, BagOptions, Filter, ReadOptions, ops};
+//!
+//! # fn main() -> swath_bags::Result<()> {
+//! let bag = Bag::open(Path::new("out/bag"))?;
+//! println!("{}", ops::info::info(&bag));
+//! let copied = ops::copy::filter(&bag, &Filter::default(), Path::new("out/copy"), BagOptions::default())?;
+//! assert!(copied.faults.is_empty(), "what could not be read is told");
+//! let report = ops::validate::validate(Path::new("out/copy"), None, ReadOptions::default())?;
+//! assert!(report.faults.is_empty());
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod cat;
 mod checks;

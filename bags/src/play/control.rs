@@ -9,7 +9,7 @@ use swath_msgs::rosbag2_interfaces::{
 use swath_ros::{Node, RosError, Server, graph};
 
 use super::{engine::Engine, keys::Key};
-use crate::error::Result;
+use crate::{error::Result, out::say};
 
 /// What a rate key multiplies by.
 const RATE_STEP: f64 = 1.1;
@@ -98,7 +98,7 @@ pub(super) fn follow_key(key: Key, engine: &mut Engine<'_>) -> Result<()> {
     }
     let state = if engine.pace.is_paused() { "paused" } else { "playing" };
     let at = Duration::from_nanos(engine.pace.log_time(now)).as_secs_f64();
-    eprintln!("{state} at {at:.3} s, rate {:.3}", engine.pace.rate());
+    say(&format!("{state} at {at:.3} s, rate {:.3}", engine.pace.rate()));
     Ok(())
 }
 

@@ -264,6 +264,30 @@ fn a_tap_hands_topic_type_stamp_and_bytes_to_any_sink() {
     assert_eq!(kept.messages, expected);
 }
 
+#[test]
+fn what_a_tap_leaves_for_its_next_turn_is_waited_for_no_longer() {
+    let publishing = node(50);
+    let states = publishing.publisher(&graph::SPACECRAFT_STATE).unwrap();
+    let words = ["--ros-args", "-r", "__node:=tap", "--disable-rosout-logs"].map(str::to_owned);
+    let (_, args) = RosArgs::split(words).unwrap();
+    let environment = Environment { domain: 50, localhost_only: false, mapping: Mapping::Cyclone };
+    let listening = Node::start_in(environment, graph::OPERATOR, &args).unwrap();
+    let topics = TopicPattern::new(&["/swath/spacecraft/state".to_owned()], None, None).unwrap();
+    let mut tap = Tap::new(listening, Selection { topics, depth: 20_000, ..Selection::default() }).unwrap();
+    wait_until("the tap is heard", || states.matched() > 0);
+    (1..=10_000).for_each(|tick| states.publish(&state(tick)).unwrap());
+    assert!(states.flush(PATIENCE), "all have come");
+    let mut kept = Kept::default();
+    let first = tap.take_all(&mut kept).unwrap();
+    assert!(first < 10_000, "one turn takes {first}");
+    // Nothing else comes that would raise it.
+    assert!(tap.node().signal().wait(Duration::ZERO), "the rest raises the signal");
+    while tap.node().signal().wait(Duration::ZERO) {
+        tap.take_all(&mut kept).unwrap();
+    }
+    assert_eq!(kept.messages.len(), 10_000);
+}
+
 /// The worst that the recorder says of itself within some time.
 fn worst(diagnostics: &Subscription<DiagnosticArray>) -> u8 {
     let mut worst = DiagnosticStatus::OK;

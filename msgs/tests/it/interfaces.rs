@@ -45,7 +45,7 @@ fn type_hashes_are_those_of_ros_2() {
         ("swath_msgs/msg/StripReport", "3aa2ee64544d095aac4be44fe0bc17efdad0804d419b87c4dd6a8145cdbcc056"),
         ("swath_msgs/msg/PlannerStatus", "3df64d3c75cb3fd1a6ef4e97a9be8ccebea4a694a0f92007885a8d96992ddbe9"),
         ("swath_msgs/msg/Decision", "6cf2e48f3726d92af6cb2751a1f9f66fc0e245b7cf45938fba0eeedc9f0e6219"),
-        ("swath_msgs/msg/UpcomingStrips", "1388aca98cf3f4bc2c85b3e18c2f0197f21996af32a973f5f96ad1c4d8849394"),
+        ("swath_msgs/msg/UpcomingStrips", "85f1f6c705dd469a2336343601f3c88e50235420c6d1857e61fa7d695185ed23"),
     ] {
         assert_eq!(type_hash_for(type_name), Some(format!("RIHS01_{hash}").as_str()), "{type_name}");
     }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use swath_ground::requests::store::Store;
 use swath_mission::file::Mission;
-use swath_mission::orders::geojson;
+use swath_mission::orders::import;
 use swath_mission::orders::order::Order;
 use swath_mission::requests::logic::RequestLogic;
 use swath_msgs::swath_msgs as msg;
@@ -122,7 +122,7 @@ fn order(number: u32) -> Order {
 /// Seconds for `swath strips submit` from its start to its end.
 fn submit_file(swath: &Path, folder: &Path) -> Result<f64> {
     let file: PathBuf = folder.join("strips.geojson");
-    geojson::write(&file, &(0..FILE).map(order).collect::<Vec<_>>())?;
+    import::write(&file, &(0..FILE).map(order).collect::<Vec<_>>())?;
     // The node has come up by then: what is measured is the submission.
     let ask = || local(swath).args(["strips", "list", "--limit", "1"]).stdout(Stdio::null()).status();
     ensure!(ask()?.success(), "the request manager does not answer");

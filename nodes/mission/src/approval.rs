@@ -225,6 +225,8 @@ impl Gate {
                 Ok(Decision::Image { candidate: index, t_pre })
             }
             Decision::Wait { ticks } => Ok(Decision::Wait { ticks: ticks.min(self.look_again) }),
+            // What the satellite does for itself needs nobody's approval.
+            duty @ Decision::Serve { .. } => Ok(duty),
         }
     }
 
@@ -246,6 +248,8 @@ impl Gate {
                 Ok(Decision::Wait { ticks: self.look_again })
             }
             Decision::Wait { ticks } => Ok(Decision::Wait { ticks: ticks.min(self.look_again) }),
+            // What the satellite does for itself needs nobody's approval.
+            duty @ Decision::Serve { .. } => Ok(duty),
         }
     }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
+use swath_sim::config::resources::ResourcesConfig;
 use swath_sim::error::SimError;
 use swath_sim::mission::horizon;
 use swath_sim::model::Model;
@@ -15,11 +16,12 @@ use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::spacecraft::Spacecraft;
+use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
-use crate::orders::geojson;
-use crate::orders::geojson::{Lengths, RequestsFileError};
+use crate::orders::cutting::{Cutting, SWATH_KM};
+use crate::orders::import::{Fault, RequestsFileError, import};
 use crate::orders::order::Order;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
@@ -97,6 +99,10 @@ pub struct Mission {
     pub initial: Option<InitialState>,
     /// Physics and the planning problem.
     pub sim: SimConfig,
+    /// Power, data and momentum of the satellite, a shorter way to write `[sim.resources]`; reading a mission puts it
+    /// there.
+    #[serde(skip_serializing)]
+    pub resources: Option<Box<ResourcesConfig>>,
     /// How the satellite that is flown differs from what guidance and planner believe of it.
     #[serde(skip_serializing_if = "is_exact")]
     pub plant: PlantErrors,
@@ -110,10 +116,12 @@ fn is_exact(plant: &PlantErrors) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MissionRequests {
-    /// GeoJSON files, relative to the mission file.
+    /// Files with lines and areas, of any format that is read, relative to the mission file.
     pub files: Vec<PathBuf>,
     /// Attempts before a request fails, for requests that do not say; attempts that were cut short do not count.
     pub max_attempts: u32,
+    /// Width of what the camera shows [km]: lines are followed and areas are covered by strips of it.
+    pub swath_km: f64,
     /// Random strips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub random: Option<ScenarioConfig>,
@@ -121,7 +129,7 @@ pub struct MissionRequests {
 
 impl Default for MissionRequests {
     fn default() -> Self {
-        Self { files: Vec::new(), max_attempts: 10, random: None }
+        Self { files: Vec::new(), max_attempts: 10, swath_km: SWATH_KM, random: None }
     }
 }
 
@@ -141,6 +149,7 @@ impl Default for Mission {
             hold_s: 10.0,
             initial: None,
             sim: SimConfig::default(),
+            resources: None,
             plant: PlantErrors::default(),
         }
     }
@@ -161,8 +170,18 @@ impl Mission {
         for file in &mut mission.requests.files {
             *file = folder.join(&*file);
         }
+        mission.sim.resources = mission.resources.take().or(mission.sim.resources);
         mission.validate()?;
         Ok(mission)
+    }
+
+    /// Stations of the mission that its orbit never sees.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn stations_never_seen(&self) -> Result<Vec<NeverSeen>, MissionError> {
+        let model = self.model()?;
+        Ok(model.stations.iter().filter_map(|station| station.never_seen(&model.config)).collect())
     }
 
     /// Checks every setting's range.
@@ -178,6 +197,7 @@ impl Mission {
             ("requests.max_attempts", f64::from(self.requests.max_attempts), 1.0, f64::from(ATTEMPTS_MAX)),
             ("approval.deadline_s", self.approval.deadline_s, 0.1, 1e6),
             ("approval.look_again_s", self.approval.look_again_s, 0.1, 3600.0),
+            ("requests.swath_km", self.requests.swath_km, 0.1, 1000.0),
         ] {
             if !(min..=max).contains(&value) {
                 return Err(MissionError::OutOfRange { name, value, min, max });
@@ -250,14 +270,24 @@ impl Mission {
         horizon(model, self.orbits)
     }
 
-    /// The strips known from the start: those of the files, in order, then the random ones.
+    /// How lines and areas become strips.
+    #[must_use]
+    pub fn cutting(&self) -> Cutting {
+        let swath_km = self.requests.swath_km;
+        Cutting { swath_km, tolerance_km: 0.5 * swath_km, ..Cutting::of(&self.sim) }
+    }
+
+    /// The strips known from the start: those of the files, in order, then the random ones; and what in the files is no
+    /// strip.
     ///
     /// # Errors
-    /// When a file cannot be used.
-    pub fn initial_requests(&self) -> Result<Vec<Order>, MissionError> {
-        let mut requests = Vec::new();
+    /// When a file as a whole cannot be used.
+    pub fn initial_requests(&self) -> Result<(Vec<Order>, Vec<Fault>), MissionError> {
+        let (mut requests, mut faults) = (Vec::new(), Vec::new());
         for file in &self.requests.files {
-            requests.extend(geojson::read(file, Lengths::of(&self.sim))?);
+            let import = import(file, &self.cutting())?;
+            requests.extend(import.orders);
+            faults.extend(import.refused);
         }
         if let Some(scenario) = &self.requests.random {
             let mut rng = rng::stream(self.seed, rng::CATALOGUE);
@@ -269,7 +299,7 @@ impl Mission {
                 }),
             );
         }
-        Ok(requests)
+        Ok((requests, faults))
     }
 }
 
@@ -287,6 +317,30 @@ mod tests {
     fn a_mission_survives_its_own_text() {
         let mission = Mission { seed: 7, ..Mission::default() }.resolved();
         assert_eq!(parse(&toml::to_string(&mission).unwrap()), Ok(mission));
+    }
+
+    #[test]
+    fn resources_are_read_with_their_profile_and_stations_never_seen_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mission.toml");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            Mission::read(&path).map_err(|error| error.to_string())
+        };
+        let mission = read("[resources]\nbus_w = 55.0\nstations = [\"boulder\", \"svalbard\"]").unwrap();
+        let resources = mission.sim.resources.clone().unwrap();
+        assert_eq!((resources.bus_w, resources.panel_area_m2), (55.0, 1.18));
+        let unseen: Vec<String> = mission.stations_never_seen().unwrap().iter().map(ToString::to_string).collect();
+        assert_eq!(unseen.len(), 1);
+        assert!(unseen[0].starts_with("station svalbard at latitude 78.2° never sees"), "{unseen:?}");
+        // What is resolved says it once, and is the same mission.
+        let text = toml::to_string(&mission).unwrap();
+        assert!(text.contains("[sim.resources]") && !text.contains("\n[resources]"), "{text}");
+        assert_eq!(read(&text), Ok(mission));
+        let error = read("[resources]\npanel_efficiency = 1.5").unwrap_err();
+        assert_eq!(error, "mission setting resources.panel_efficiency is 1.5, outside 0 to 1");
+        let error = read("[resources]\nstations = []").unwrap_err();
+        assert!(error.contains("no stations to send to"), "{error}");
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Planners as missions fly them: whatever happens to one, somebody decides.
 
+use std::collections::BTreeMap;
+
 use anyhow::Result;
 use swath_sim::planner::{Decision, DecisionContext, Heuristic, Planner, PlannerError, PlannerSpec, Rationale};
 
@@ -18,15 +20,28 @@ pub struct Policies {
 /// Transition of the heuristic that takes over from a planner that fails [s].
 const FALLBACK_T_PRE_S: f64 = 90.0;
 
+/// The planner that takes over.
+const FALLBACK: Heuristic = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
+
+/// Who made the decisions of a mission: their numbers by name of the planner.
+pub type Deciders = BTreeMap<String, u64>;
+
+/// How many decisions the heuristic made in the place of the planner that was asked for.
+#[must_use]
+pub fn made_instead(deciders: &Deciders, asked_for: &PlannerSpec) -> u64 {
+    let name = FALLBACK.name();
+    if asked_for.to_string() == name { 0 } else { deciders.get(&name).copied().unwrap_or(0) }
+}
+
 /// A planner with the heuristic behind it, which decides when the planner cannot.
 pub struct GuardedPlanner {
     /// None when it could not be made.
     planner: Option<Box<dyn Planner + Send>>,
-    fallback: Heuristic,
     /// Why the planner itself did not make the last decision.
     fault: Option<String>,
     /// Why it could not be made.
     missing: Option<String>,
+    deciders: Deciders,
 }
 
 impl GuardedPlanner {
@@ -35,26 +50,28 @@ impl GuardedPlanner {
     pub fn make(policies: &Policies, spec: &PlannerSpec, seed: u64) -> Self {
         match (policies.make)(spec, seed) {
             Ok(planner) => Self::new(planner),
-            Err(error) => Self {
-                planner: None,
-                fallback: Heuristic { t_pre_s: FALLBACK_T_PRE_S },
-                fault: None,
-                missing: Some(format!("{error:#}")),
-            },
+            Err(error) => {
+                Self { planner: None, fault: None, deciders: Deciders::new(), missing: Some(format!("{error:#}")) }
+            }
         }
     }
 
     /// Guards a planner.
     #[must_use]
     pub fn new(planner: Box<dyn Planner + Send>) -> Self {
-        let fallback = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
-        Self { planner: Some(planner), fallback, fault: None, missing: None }
+        Self { planner: Some(planner), fault: None, missing: None, deciders: Deciders::new() }
     }
 
     /// Why there is no planner but the heuristic.
     #[must_use]
     pub fn missing(&self) -> Option<&str> {
         self.missing.as_deref()
+    }
+
+    /// Who has made the decisions.
+    #[must_use]
+    pub fn deciders(&self) -> &Deciders {
+        &self.deciders
     }
 
     /// Why the heuristic made the last decision in the planner's place.
@@ -74,16 +91,21 @@ impl Planner for GuardedPlanner {
     /// Name of the planner that made the last decision, or will make the first.
     fn name(&self) -> String {
         let own = self.planner.as_ref().filter(|_| self.fault.is_none());
-        own.map_or_else(|| self.fallback.name(), |planner| planner.name())
+        own.map_or_else(|| FALLBACK.name(), |planner| planner.name())
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
-        let Some(planner) = &mut self.planner else { return usable(&mut self.fallback, context) };
+        let mut fallback = FALLBACK;
         self.fault = None;
-        usable(planner.as_mut(), context).or_else(|error| {
-            self.fault = Some(error.to_string());
-            usable(&mut self.fallback, context)
-        })
+        let decision = match &mut self.planner {
+            Some(planner) => usable(planner.as_mut(), context).or_else(|error| {
+                self.fault = Some(error.to_string());
+                usable(&mut fallback, context)
+            }),
+            None => usable(&mut fallback, context),
+        };
+        *self.deciders.entry(self.name()).or_insert(0) += 1;
+        decision
     }
 
     fn rationale(&self) -> Option<Rationale> {

@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use crate::file::{Mission, MissionError};
 use crate::orders::action::Action;
-use crate::outcome::TaskLine;
+use crate::outcome::{ResourcesSummary, TaskLine};
 use crate::requests::logic::RequestLogic;
 use crate::requests::refusal::Refusal;
 
@@ -89,7 +89,8 @@ impl InProcessMission {
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
-        let initial = mission.initial_requests()?;
+        let (initial, faults) = mission.initial_requests()?;
+        faults.iter().for_each(|fault| tracing::warn!("{fault}"));
         let requested = initial.len();
         for order in initial {
             // Why one is refused is in the request manager's counts.
@@ -126,6 +127,17 @@ impl InProcessMission {
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
         (self.requested, self.requests().len())
+    }
+
+    /// What came to the ground so far and how power and data stand, in a mission with resources.
+    #[must_use]
+    pub fn resources(&self) -> Option<ResourcesSummary> {
+        let onboard = self.mission.onboard()?;
+        Some(ResourcesSummary {
+            delivered: *self.mission.delivered(),
+            battery_level: onboard.battery().level(),
+            stored_bits: onboard.storage().stored(),
+        })
     }
 
     /// Decides and flies to the end, handing each task and its line to `each`.

@@ -9,5 +9,6 @@ pub mod in_process;
 pub mod orders;
 pub mod outcome;
 pub mod requests;
+pub mod shapes;
 pub mod task_log;
 pub mod time_text;

@@ -1,8 +1,11 @@
 //! What a mission leaves behind beside its bag: a line a task, and a summary.
 
 use serde::{Deserialize, Serialize};
+use swath_sim::mission::Delivered;
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
+
+use crate::guarded::Deciders;
 
 /// One line of `tasks.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,8 +70,14 @@ pub struct NodeProcess {
 /// `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Planner's name.
+    /// Name of the planner that was asked for.
     pub planner: String,
+    /// Decisions by the name of the planner that made them.
+    #[serde(default)]
+    pub deciders: Deciders,
+    /// Why the mission was not flown to its end; absent if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
     /// Seed of the mission.
     pub seed: u64,
     /// Length [orbits].
@@ -103,13 +112,31 @@ pub struct Summary {
     pub messages_recorded: u64,
     /// Processes that flew the mission.
     pub nodes: Vec<NodeProcess>,
+    /// What came to the ground and what was left, in a mission with `[resources]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resources: Option<ResourcesSummary>,
+}
+
+/// What came to the ground, and how power and data stood at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResourcesSummary {
+    /// Images that came to the ground, their priorities, and failures of battery or wheels.
+    pub delivered: Delivered,
+    /// Charge over capacity at the end.
+    pub battery_level: f64,
+    /// Bits stored at the end.
+    pub stored_bits: u64,
 }
 
 /// What a summary takes from outside the totals.
 #[derive(Clone, Debug, Default)]
 pub struct SummaryInputs {
-    /// Planner's name.
+    /// Name of the planner that was asked for.
     pub planner: String,
+    /// Decisions by the name of the planner that made them.
+    pub deciders: Deciders,
+    /// Why the mission was not flown to its end.
+    pub failure: Option<String>,
     /// Seed of the mission.
     pub seed: u64,
     /// Length [orbits].
@@ -126,6 +153,8 @@ pub struct SummaryInputs {
     pub messages_recorded: u64,
     /// Processes.
     pub nodes: Vec<NodeProcess>,
+    /// What came to the ground and what was left.
+    pub resources: Option<ResourcesSummary>,
 }
 
 impl Summary {
@@ -137,6 +166,8 @@ impl Summary {
         let sim_seconds = seconds(inputs.ticks);
         Self {
             planner: inputs.planner,
+            deciders: inputs.deciders,
+            failure: inputs.failure,
             seed: inputs.seed,
             orbits: inputs.orbits,
             sim_seconds,
@@ -154,6 +185,7 @@ impl Summary {
             wait_s: seconds(totals.wait_ticks),
             messages_recorded: inputs.messages_recorded,
             nodes: inputs.nodes,
+            resources: inputs.resources,
         }
     }
 
@@ -161,8 +193,10 @@ impl Summary {
     #[must_use]
     pub fn table(&self) -> String {
         let mean = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} s"));
-        let rows = [
-            ("planner", self.planner.clone()),
+        let others: Vec<_> = self.deciders.iter().filter(|(name, _)| **name != self.planner).collect();
+        let others = others.iter().map(|(name, count)| format!(", {count} decisions by {name}"));
+        let mut rows = vec![
+            ("planner", self.planner.clone() + &others.collect::<String>()),
             ("seed", self.seed.to_string()),
             ("orbits", self.orbits.to_string()),
             ("simulated time", format!("{:.0} s", self.sim_seconds)),
@@ -177,6 +211,15 @@ impl Summary {
             ("waited", format!("{:.0} s", self.wait_s)),
             ("messages recorded", self.messages_recorded.to_string()),
         ];
+        if let Some(ResourcesSummary { delivered, battery_level, stored_bits }) = &self.resources {
+            rows.extend([
+                ("strips delivered", delivered.strips.to_string()),
+                ("delivered reward", format!("{:.2}", delivered.reward)),
+                ("failures", delivered.failures.to_string()),
+                ("battery at the end", format!("{:.1} %", battery_level * 100.0)),
+                ("stored at the end", format!("{:.3} Gbit", *stored_bits as f64 / 1e9)),
+            ]);
+        }
         let lines = rows.iter().map(|(name, value)| format!("  {name:<20} {value}\n"));
         lines.collect()
     }

@@ -4,4 +4,6 @@ pub mod error;
 pub mod messages;
 pub mod node;
 pub mod orders;
+pub mod out;
+pub mod program;
 pub mod stamp;

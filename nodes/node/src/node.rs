@@ -1,26 +1,19 @@
 //! What every node of a mission starts with: its ROS node, its mission, its alarms.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
-use clap::Parser;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
 
+use crate::out;
+use crate::program::{MISSION, Program};
 use crate::stamp::Stamper;
 use swath_mission::file::Mission;
-
-/// Own words of a node's command line; everything else is a ROS parameter.
-#[derive(Debug, Parser)]
-#[command(
-    version,
-    about = "Nodes, launcher and operator command line of Swath",
-    after_help = "Example: swath-guidance --ros-args -p mission:=out/mission.toml"
-)]
-struct NodeArgs {}
 
 /// A started node and the mission that it flies.
 pub struct MissionNode {
@@ -49,20 +42,20 @@ pub enum Severity {
 }
 
 impl MissionNode {
-    /// Starts the node `name` with the mission that its parameter `mission` names.
+    /// Starts a node with the mission that its parameter `mission` names.
     ///
     /// # Errors
     /// When the command line or the mission is not valid, or the node cannot come up.
-    pub fn start(name: &'static str) -> Result<Self> {
+    pub fn start(program: &Program) -> Result<Self> {
         let (own, args) = RosArgs::split(std::env::args())?;
-        NodeArgs::parse_from(own);
-        Self::start_with(name, &args)
+        program.parse(own);
+        Self::start_with(program.node, &args)
     }
 
     fn start_with(name: &'static str, args: &RosArgs) -> Result<Self> {
         let node = Node::start(name, args)?;
         let shutdown = Shutdown::on_signals(node.signal())?;
-        let spec = Spec::new("mission", String::new(), "Path of the mission file (TOML).").read_only();
+        let spec = Spec::new(MISSION.name, String::new(), MISSION.about).read_only();
         let path = PathBuf::from(node.parameters().declare(spec)?);
         if path.as_os_str().is_empty() {
             bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
@@ -115,15 +108,14 @@ impl MissionNode {
     }
 }
 
-/// Runs a node's body and turns its outcome into an exit code, told on stderr.
+/// Turns the outcome of a node into an exit code; an error is told once, in the log as soon as there is one.
 #[must_use]
-pub fn exit_code(outcome: Result<()>) -> std::process::ExitCode {
-    match outcome {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(error) => {
-            tracing::error!("{error:#}");
-            eprintln!("error: {error:#}");
-            std::process::ExitCode::FAILURE
-        }
+pub fn exit_code(outcome: Result<()>) -> ExitCode {
+    let Err(error) = outcome else { return ExitCode::SUCCESS };
+    if tracing::dispatcher::has_been_set() {
+        tracing::error!("{}", out::chain(&error));
+    } else {
+        out::say(format_args!("error: {}", out::chain(&error)));
     }
+    ExitCode::FAILURE
 }

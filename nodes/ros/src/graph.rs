@@ -11,7 +11,7 @@ use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
-    CancelStrips, Decision, DecisionPoint, GetStrip, GuidanceStatus, ImagingTask, ListHistory, ListStrips,
+    CancelStrips, Decision, DecisionPoint, GetLimits, GetStrip, GuidanceStatus, ImagingTask, ListHistory, ListStrips,
     OperatorAction, PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips,
     SetPlannerMode, SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult,
     UpcomingStrips, WheelTorque,
@@ -179,6 +179,8 @@ pub const LIST_STRIPS: Service<ListStrips> = Service::new("requests/list", &[REQ
 pub const LIST_HISTORY: Service<ListHistory> = Service::new("requests/history", &[REQUEST_MANAGER], &[OPERATOR]);
 /// When a strip could be imaged.
 pub const PREVIEW_STRIP: Service<PreviewStrip> = Service::new("requests/preview", &[REQUEST_MANAGER], &[OPERATOR]);
+/// What strips may be.
+pub const GET_LIMITS: Service<GetLimits> = Service::new("requests/limits", &[REQUEST_MANAGER], &[OPERATOR]);
 /// What the planner may do by itself.
 pub const SET_PLANNER_MODE: Service<SetPlannerMode> = Service::new("planner/set_mode", &[PLANNER], &[OPERATOR]);
 /// Approves or rejects what the planner proposes.
@@ -222,6 +224,7 @@ pub const SERVICES: &[Entry] = &[
     LIST_STRIPS.entry,
     LIST_HISTORY.entry,
     PREVIEW_STRIP.entry,
+    GET_LIMITS.entry,
     SET_PLANNER_MODE.entry,
     REVIEW_PROPOSAL.entry,
 ];
@@ -333,6 +336,7 @@ mod tests {
     operator <-.->|requests/list| request_manager
     operator <-.->|requests/history| request_manager
     operator <-.->|requests/preview| request_manager
+    operator <-.->|requests/limits| request_manager
     operator <-.->|planner/set_mode| planner
     operator <-.->|planner/review| planner
     FLIGHT([every topic]) --> recorder

@@ -1,6 +1,7 @@
 //! Log lines of `tracing` on stderr and on `/rosout`, with simulated time.
 
 use std::fmt::{self, Write as _};
+use std::io::IsTerminal as _;
 use std::sync::Arc;
 
 use swath_msgs::rcl_interfaces::Log;
@@ -20,6 +21,9 @@ use crate::topic::Publisher;
 pub(crate) fn install(name: String, level: Level, clock: SimClock, rosout: Option<Arc<Publisher<Log>>>) {
     let stderr = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
+        // Colours are for terminals; that nobody reads the log is no reason to panic.
+        .with_ansi(std::io::stderr().is_terminal())
+        .log_internal_errors(false)
         .with_timer(SimulatedTime(clock.clone()))
         .with_target(false);
     let rosout = rosout.map(|publisher| Rosout { name, clock, publisher });

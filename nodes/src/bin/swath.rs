@@ -6,12 +6,12 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use swath_ground::debrief::{export, refly, report};
 use swath_ground::{launch, operate};
-use swath_node::node;
+use swath_node::out;
 use swath_nodes::POLICIES;
 
 /// Flies and operates a super-agile Earth-observing satellite that images ground strips.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(name = "swath", version)]
 struct Args {
     #[command(subcommand)]
     command: Command,
@@ -38,20 +38,24 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    run(Args::parse().command).unwrap_or_else(|error| node::exit_code(Err(error)))
+    run(Args::parse().command).unwrap_or_else(|error| {
+        out::say(format_args!("error: {}", out::chain(&error)));
+        ExitCode::FAILURE
+    })
 }
 
-#[expect(clippy::print_stdout, reason = "the diagram is one command's result")]
 fn run(command: Command) -> Result<ExitCode> {
     match command {
-        Command::Launch(args) => launch::run(&args, &POLICIES)?,
+        Command::Launch(args) => return launch::run(&args, &POLICIES),
         Command::Strips(args) => operate::run_strips(&args)?,
         Command::Planner(args) => operate::run_planner(&args)?,
         Command::Console(args) => swath_console::run(&args)?,
         Command::Refly(args) => return args.run(&POLICIES),
         Command::Report(args) => return args.run(),
         Command::Export(args) => return args.run(),
-        Command::Graph => print!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table()),
+        Command::Graph => {
+            out::print(&format!("```mermaid\n{}```\n\n{}", swath_ros::graph::mermaid(), swath_ros::graph::table()))?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

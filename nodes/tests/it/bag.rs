@@ -121,6 +121,24 @@ fn another_planner_is_compared_decision_by_decision() {
     assert!(said.contains("first difference: decision 0, among the same strips\n"), "{said}");
 }
 
+#[test]
+fn bags_without_a_manifest_are_flown_again_and_told_with_the_mission_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (foreign, mission) = (folder.path().join("foreign"), folder.path().join("mission.toml"));
+    copy_with_manifest(&foreign, |text| {
+        fs::write(&mission, text).unwrap();
+        None
+    });
+    let error = common::fail(&mut swath(&["refly", text(&foreign)]));
+    assert!(error.contains("--mission says which was flown"), "{error}");
+    let of_mission = ["--mission", text(&mission)];
+    let said = common::succeed(swath(&["refly", text(&foreign)]).args(of_mission));
+    assert!(said.contains("tasks are the same, byte by byte"), "{said}");
+    let page = folder.path().join("report.html");
+    common::succeed(swath(&["report", text(&foreign), "-o", text(&page)]).args(of_mission));
+    assert!(fs::read_to_string(page).unwrap().contains("<svg"));
+}
+
 /// A copy of the sample with another manifest, or with none.
 fn copy_with_manifest(target: &Path, change: impl Fn(&str) -> Option<String>) {
     let bag = Bag::open(&sample()).unwrap();

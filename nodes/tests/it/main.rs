@@ -6,6 +6,7 @@ mod bag;
 mod clients;
 mod common;
 mod examples;
+mod habits;
 mod killed;
 mod operators_day;
 mod parity;

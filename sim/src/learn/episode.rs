@@ -5,6 +5,7 @@ use std::sync::Arc;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
+use crate::config::resources::RewardKind;
 use crate::error::{SimError, StripError};
 use crate::learn::observation::{ObservationSet, observe};
 use crate::mission::{Mission, RequestKeeper, horizon, windows_until};
@@ -88,8 +89,11 @@ impl RequestKeeper for EpisodeRequests {
 pub struct StepOutcome {
     /// The task.
     pub record: TaskRecord,
-    /// The strip's priority when this fulfilled it, else 0.
+    /// The strip's priority when this fulfilled it, or what came to the ground meanwhile where that counts; less the
+    /// penalty where the battery is empty or a wheel fails.
     pub reward: f64,
+    /// Whether the satellite failed: the episode ends there for the learner.
+    pub terminated: bool,
     /// Whether the episode's length is reached. The episode does not end there for the learner: bootstrap.
     pub truncated: bool,
 }
@@ -170,8 +174,18 @@ impl Mission<EpisodeRequests> {
     /// # Errors
     /// When the decision is not one that the context allows; nothing is flown then.
     pub fn step(&mut self, decision: Decision) -> Result<StepOutcome, PlannerError> {
-        let SettledTask { record, reward } = self.fly(decision, Tick(u64::MAX))?;
-        Ok(StepOutcome { record, reward, truncated: self.truncated() })
+        let before = *self.delivered();
+        let SettledTask { record, mut reward } = self.fly(decision, Tick(u64::MAX))?;
+        let terminated = self.delivered().failures > before.failures;
+        if let Some(config) = &self.model().config.resources {
+            if config.reward == RewardKind::Delivered {
+                reward = self.delivered().reward - before.reward;
+            }
+            if terminated {
+                reward -= config.failure_penalty;
+            }
+        }
+        Ok(StepOutcome { record, reward, terminated, truncated: self.truncated() })
     }
 }
 

@@ -244,11 +244,11 @@ impl Episode {
         let env = self.env.as_mut().ok_or(LearnError::NoEpisode)?;
         loop {
             match teacher.planner.decide(&env.context())? {
-                Decision::Wait { .. } if teacher.waited_s > LONGEST_LESSON_WAIT_S => {
+                Decision::Wait { .. } | Decision::Serve { .. } if teacher.waited_s > LONGEST_LESSON_WAIT_S => {
                     return Err(LearnError::Idle { name: teacher.planner.name() });
                 }
-                Decision::Wait { ticks } => {
-                    env.step(Decision::Wait { ticks })?;
+                decision @ (Decision::Wait { ticks } | Decision::Serve { ticks, .. }) => {
+                    env.step(decision)?;
                     teacher.waited_s += self.model.period.duration_s(ticks);
                 }
                 Decision::Image { candidate, t_pre } => {
@@ -329,7 +329,7 @@ mod tests {
             let step = env.step(decision).unwrap();
             match decision {
                 Decision::Image { .. } => flown.push((step.reward, step.record.success())),
-                Decision::Wait { .. } => waits += 1,
+                Decision::Wait { .. } | Decision::Serve { .. } => waits += 1,
             }
         }
         assert!(waits > 0 && flown.len() > 10, "{waits} {}", flown.len());

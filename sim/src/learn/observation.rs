@@ -16,6 +16,15 @@ const WINDOW_SCALE_S: f64 = 300.0;
 /// Scale of the wheels' momentum [N m s]: that of a wheel at 1500 rpm.
 const MOMENTUM_SCALE: f64 = 12.5;
 
+/// Scale of shadows and contacts relative to now [s].
+const ORBIT_SCALE_S: f64 = 3000.0;
+/// Length of each of four bins of the priorities that come [s].
+const DENSITY_BIN_S: f64 = 180.0;
+/// Scale of the priorities of a bin.
+const DENSITY_SCALE: f64 = 10.0;
+/// Number of features of power and data.
+const RESOURCES: usize = 16;
+
 /// Which features a policy sees of each strip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -27,6 +36,8 @@ pub enum ObservationSet {
     Table1Momentum,
     /// Table 1, the momentum, and the attitude and rate errors as vectors in the body frame: 22 features.
     Dynamics,
+    /// The same, and how power and data stand and what comes: 38 features; the last 16 are the same for each strip.
+    Resources,
 }
 
 impl ObservationSet {
@@ -37,6 +48,7 @@ impl ObservationSet {
             Self::Table1 => 13,
             Self::Table1Momentum => 16,
             Self::Dynamics => 22,
+            Self::Resources => 22 + RESOURCES,
         }
     }
 }
@@ -59,11 +71,53 @@ pub fn observe(context: &DecisionContext<'_>, set: ObservationSet, features: &mu
     }
 }
 
+/// Charge over capacity and over the floor, Sun seen, begin and end of the shadow, storage filled and to send, begin and
+/// end of the contact, the Sun in B, and the priorities of strips whose windows open in the next four times three minutes.
+/// Where resources have no bounds: a full battery in an endless day, an empty storage.
+fn resources(context: &DecisionContext<'_>) -> [f64; RESOURCES] {
+    let (model, situation) = (context.model, context.situation);
+    let mut row = [0.0; RESOURCES];
+    for candidate in context.candidates {
+        let opens_s = candidate.window.open.since(situation.now) as f64 * model.period.seconds();
+        let bin = (opens_s / DENSITY_BIN_S).max(0.0) as usize;
+        if let Some(density) = row.get_mut(12 + bin) {
+            *density += candidate.strip.priority / DENSITY_SCALE;
+        }
+    }
+    let (Some(state), Some(config)) = (&situation.resources, model.config.resources.as_deref()) else {
+        (row[0], row[1], row[2]) = (1.0, 1.0, 1.0);
+        return row;
+    };
+    let sun = config.sun(model.config.earth.radius_m);
+    let shadow = sun.next_shadow_s(&situation.r_BN_N, &situation.v_BN_N).unwrap_or_default();
+    let relative = |tick: crate::time::Tick| tick.since(situation.now) as f64 * model.period.seconds();
+    let contact = state.contact.map_or((0.0, 0.0), |(rise, set)| (relative(rise), relative(set)));
+    let of_storage = |bits: u64| bits as f64 / state.storage_bits.max(1) as f64;
+    let sun_B = mrp::Rotation::new(&situation.body.sigma_BN).apply(sun.direction_N());
+    let own = [
+        state.level(),
+        state.level() - config.battery_floor,
+        state.illumination,
+        shadow.0 / ORBIT_SCALE_S,
+        shadow.1 / ORBIT_SCALE_S,
+        of_storage(state.stored_bits),
+        of_storage(state.to_send_bits),
+        contact.0 / ORBIT_SCALE_S,
+        contact.1 / ORBIT_SCALE_S,
+        sun_B.x,
+        sun_B.y,
+        sun_B.z,
+    ];
+    row.iter_mut().zip(own).for_each(|(slot, value)| *slot = value);
+    row
+}
+
 /// What all strips of one observation share.
 struct Frame {
     earth: Turn,
     dcm_HN: nalgebra::Matrix3<f64>,
     momentum_B: Vector3<f64>,
+    resources: [f64; RESOURCES],
 }
 
 impl Frame {
@@ -73,6 +127,7 @@ impl Frame {
             earth: context.model.earth.clone(),
             dcm_HN: hill_dcm(&situation.r_BN_N, &situation.v_BN_N),
             momentum_B: situation.body.wheel_speed * (context.model.plant.wheel_inertia / MOMENTUM_SCALE),
+            resources: resources(context),
         }
     }
 
@@ -105,7 +160,7 @@ impl Frame {
             relative(candidate.window.close),
         ];
         let vectors = [self.momentum_B, sigma_BR, omega_BR_B / RATE_SCALE];
-        let extra = vectors.iter().flat_map(|v| v.iter().copied());
+        let extra = vectors.iter().flat_map(|v| v.iter().copied()).chain(self.resources);
         for (slot, value) in row.iter_mut().zip(table1.into_iter().chain(extra)) {
             *slot = value as f32;
         }

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::model::Model;
 use crate::requests::catalogue::Candidate;
-use crate::task::{Task, TaskRecord};
+use crate::task::{Duty, Task, TaskRecord};
 use crate::vehicle::flight::Situation;
 
 /// Everything that a decision rests on.
@@ -37,6 +37,13 @@ pub enum Decision {
         /// For how long [ticks], at least 1.
         ticks: u32,
     },
+    /// See to power, data or momentum.
+    Serve {
+        /// What is done.
+        duty: Duty,
+        /// For how long [ticks], at least 1.
+        ticks: u32,
+    },
 }
 
 /// Why a planner gave no usable decision.
@@ -61,6 +68,12 @@ pub enum PlannerError {
     /// A wait of no ticks would never end.
     #[error("a wait of 0 ticks was chosen")]
     EmptyWait,
+    /// Power, data and momentum have no bounds in this mission.
+    #[error("{duty:?} was chosen, but the mission has no [resources]")]
+    NoResources {
+        /// What was chosen.
+        duty: Duty,
+    },
     /// The policy itself failed.
     #[error("policy failed: {0}")]
     Policy(String),
@@ -83,8 +96,12 @@ impl Decision {
                 }
                 Ok(Task::Image { id: chosen.id, strip: chosen.strip, t_pre, t_acq: chosen.t_acq })
             }
-            Self::Wait { ticks: 0 } => Err(PlannerError::EmptyWait),
+            Self::Wait { ticks: 0 } | Self::Serve { ticks: 0, .. } => Err(PlannerError::EmptyWait),
             Self::Wait { ticks } => Ok(Task::Wait { ticks }),
+            Self::Serve { duty, .. } if context.model.config.resources.is_none() => {
+                Err(PlannerError::NoResources { duty })
+            }
+            Self::Serve { duty, ticks } => Ok(Task::Serve { duty, ticks }),
         }
     }
 }

@@ -4,10 +4,12 @@ mod decision;
 mod heuristic;
 mod lookahead;
 mod random;
+mod shield;
 mod spec;
 
 pub use decision::{Decision, DecisionContext, Planner, PlannerError, Rationale, wait_for_a_window};
 pub use heuristic::Heuristic;
 pub use lookahead::{Allowance, Beam, BeamSearch, Experience, Found, Lookahead, Search, Sequence};
 pub use random::Random;
+pub use shield::Shield;
 pub use spec::{PlannerSpec, UnknownPlanner};

@@ -3,12 +3,12 @@
 use nalgebra::Vector3;
 
 use crate::model::Model;
-use crate::task::{Task, TaskOutcome, TaskRecord};
+use crate::task::{Duty, Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::executive::{Executive, Sight};
 use crate::vehicle::guidance::GuidanceTick;
-use crate::vehicle::resources::{Activity, Imager};
+use crate::vehicle::resources::{Activity, Imager, ResourceState};
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;
 
@@ -27,6 +27,8 @@ pub struct Situation {
     pub servo_integral: Vector3<f64>,
     /// Torque commanded one tick ago, which acts until the next tick [N m].
     pub torque_pending: Vector3<f64>,
+    /// How power and data stand, where they have bounds.
+    pub resources: Option<ResourceState>,
 }
 
 /// Spacecraft and executive in one process, with the latency of one tick between them.
@@ -81,6 +83,7 @@ impl Flight {
             body: *self.spacecraft.measured(),
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
+            resources: self.spacecraft.onboard().map(|onboard| *onboard.state()),
         }
     }
 
@@ -136,7 +139,9 @@ impl Flight {
                     activity.imager = Imager::Warm;
                 }
             }
-            Task::Wait { .. } => {}
+            Task::Serve { duty: Duty::Downlink, .. } => activity.downlink = true,
+            Task::Serve { duty: Duty::Desaturate, .. } => activity.desaturate = Some(now.since(start) as u32),
+            Task::Serve { duty: Duty::Charge, .. } | Task::Wait { .. } => {}
         }
         activity
     }

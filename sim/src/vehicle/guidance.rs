@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::model::Model;
-use crate::task::{FailureReason, Task, TaskOutcome};
+use crate::task::{Duty, FailureReason, Task, TaskOutcome};
 use crate::time::Tick;
 use crate::vehicle::control::{ControlLaw, TrackingError};
 use crate::vehicle::dynamics::{BodyState, Plant};
@@ -20,14 +20,14 @@ pub struct GuidanceTick {
     pub torque: Vector3<f64>,
     /// Tracking error.
     pub error: TrackingError,
-    /// Sine of the elevation of the satellite seen from the target; 1 in a wait.
+    /// Sine of the elevation of the satellite seen from the target; 1 without one.
     pub sin_elevation: f64,
     /// Whether the strip is being imaged.
     pub imaging: bool,
 }
 
 impl GuidanceTick {
-    /// Elevation of the satellite seen from the target [rad]; π/2 in a wait.
+    /// Elevation of the satellite seen from the target [rad]; π/2 without one.
     #[must_use]
     pub fn elevation(&self) -> f64 {
         libm::asin(self.sin_elevation)
@@ -43,9 +43,30 @@ pub struct Guidance {
     earth: Turn,
     earth_radius: f64,
     dt: f64,
+    axes: Option<Axes>,
     /// Rate-error integral z of the servo [rad]; persists from task to task.
     pub servo_integral: Vector3<f64>,
     active: Option<ActiveTask>,
+}
+
+/// Body axes that duties point, and the Sun.
+#[derive(Clone, Copy, Debug)]
+struct Axes {
+    panel_B: Vector3<f64>,
+    antenna_B: Vector3<f64>,
+    sun_N: Vector3<f64>,
+}
+
+impl Axes {
+    fn new(model: &Model) -> Option<Self> {
+        let resources = model.config.resources.as_ref()?;
+        let sun = resources.sun(model.config.earth.radius_m);
+        Some(Self {
+            panel_B: Vector3::from(resources.panel_normal_b).normalize(),
+            antenna_B: Vector3::from(resources.antenna_axis_b).normalize(),
+            sun_N: *sun.direction_N(),
+        })
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -124,6 +145,7 @@ impl Guidance {
             earth: model.earth.clone(),
             earth_radius: config.earth.radius_m,
             dt: model.period.seconds(),
+            axes: Axes::new(model),
             servo_integral: Vector3::zeros(),
             active: None,
         }
@@ -171,6 +193,7 @@ impl Guidance {
             let error = TrackingError { sigma_BR: Vector3::zeros(), omega_BR_B: Vector3::zeros() };
             return GuidanceTick { torque: Vector3::zeros(), error, sin_elevation: 1.0, imaging: false };
         };
+        let mut boresight_B = None;
         let (sigma_BR, sin_elevation, imaging) = match active.task {
             Task::Image { strip, t_pre, .. } => {
                 let (sigma_BR, sin_el) = self.track(&strip, active.start, t_pre, now, r_BN_N, body);
@@ -180,15 +203,27 @@ impl Guidance {
                 }
                 (sigma_BR, sin_el, imaging)
             }
-            Task::Wait { .. } => {
+            Task::Serve { duty, .. } if let Some(axes) = &self.axes => {
+                let (axis_B, direction_N) = match duty {
+                    Duty::Charge | Duty::Desaturate => (axes.panel_B, axes.sun_N),
+                    Duty::Downlink => (axes.antenna_B, -r_BN_N.normalize()),
+                };
+                boresight_B = Some(axis_B);
+                (pointing_error(&axis_B, &direction_N, &body.sigma_BN), 1.0, false)
+            }
+            Task::Wait { .. } | Task::Serve { .. } => {
                 let bn = mrp::to_euler_parameters(&body.sigma_BN);
                 (mrp::from_euler_parameters(&mrp::relative_euler_parameters(&bn, &active.hold)), 1.0, false)
             }
         };
-        let omega_BR_B = match &active.previous_sigma {
+        let mut omega_BR_B = match &active.previous_sigma {
             Some(previous) => rate_error(&sigma_BR, previous, self.dt),
             None => Vector3::zeros(),
         };
+        if let Some(axis_B) = boresight_B {
+            // No direction says how the satellite turns about the axis: it should not.
+            omega_BR_B += axis_B * (body.omega_BN_B - omega_BR_B).dot(&axis_B);
+        }
         active.previous_sigma = Some(sigma_BR);
         self.active = Some(active);
         let error = TrackingError { sigma_BR, omega_BR_B };
@@ -217,6 +252,27 @@ impl Guidance {
     }
 }
 
+/// Shortest turn, as σ_BR, from where a unit vector of B points to a direction in N (Basilisk locationPointing).
+#[must_use]
+pub fn pointing_error(axis_B: &Vector3<f64>, direction_N: &Vector3<f64>, sigma_BN: &Vector3<f64>) -> Vector3<f64> {
+    let direction_B = mrp::Rotation::new(sigma_BN).apply(direction_N);
+    let across = axis_B.cross(&direction_B);
+    let (sine, cosine) = (across.norm(), axis_B.dot(&direction_B));
+    let angle = libm::atan2(sine, cosine);
+    if sine > POINTING_EPSILON * direction_B.norm() {
+        across * (-libm::tan(angle / 4.0) / sine)
+    } else if cosine > 0.0 {
+        Vector3::zeros()
+    } else {
+        // Opposite: any axis across will do.
+        let across = axis_B.cross(&Vector3::ith(axis_B.iamin(), 1.0)).normalize();
+        across * -libm::tan(angle / 4.0)
+    }
+}
+
+/// Sine below which a direction is taken as along the axis.
+const POINTING_EPSILON: f64 = 1e-10;
+
 /// ω_BR by backward difference of σ_BR over one tick (after eq. 11), over whichever MRP set of the previous error is
 /// nearer, so that a switch of sets is not read as a jump.
 #[inline]
@@ -238,6 +294,25 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
+
+    #[test]
+    fn the_pointing_error_is_the_shortest_turn_to_the_direction() {
+        let sigma_BN = Vector3::new(0.2, -0.3, 0.1);
+        let axis_B = Vector3::new(0.0, 0.0, -1.0);
+        for direction_N in [Vector3::x(), Vector3::new(0.3, 0.4, -0.6).normalize()] {
+            let sigma_BR = pointing_error(&axis_B, &direction_N, &sigma_BN);
+            // R is B turned so that the axis points there: dcm_RN = dcm_BRᵀ·dcm_BN.
+            let dcm_RN = mrp::to_dcm(&sigma_BR).transpose() * mrp::to_dcm(&sigma_BN);
+            assert_relative_eq!(dcm_RN * direction_N, axis_B, epsilon = 1e-12);
+            let angle = (mrp::to_dcm(&sigma_BN) * direction_N).angle(&axis_B);
+            assert_relative_eq!(mrp::principal_angle(&sigma_BR), angle, epsilon = 1e-12);
+        }
+        let along_N = mrp::to_dcm(&sigma_BN).transpose() * axis_B;
+        assert_eq!(pointing_error(&axis_B, &along_N, &sigma_BN), Vector3::zeros());
+        let opposite = pointing_error(&axis_B, &-along_N, &sigma_BN);
+        assert_relative_eq!(opposite.norm(), 1.0, epsilon = 1e-9);
+        assert_relative_eq!(opposite.dot(&axis_B), 0.0);
+    }
 
     #[test]
     fn a_switch_of_mrp_sets_is_no_jump() {

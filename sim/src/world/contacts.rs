@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use crate::config::SimConfig;
+use crate::config::station::Station;
 use crate::time::{Tick, TickPeriod};
 use crate::world::frames::{earth_to_inertial, sin_elevation};
 use crate::world::orbit::Orbit;
-use crate::world::stations::Station;
 use crate::world::turn::{Turn, earth_turn};
 use crate::world::windows::WindowFinder;
 
@@ -204,9 +204,9 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
+    use crate::config::station::names;
     use crate::model::Model;
     use crate::world::orbit::OrbitPhase;
-    use crate::world::stations::names;
 
     /// Contacts by looking at every tick: slow, and independent of the roots.
     fn by_every_tick(view: &mut View, station: &Station, orbit: &mut Orbit, until: u64) -> Vec<(u64, u64, f64)> {

@@ -76,6 +76,31 @@ impl Sun {
         self.seen_disc(r_BN_N)
     }
 
+    /// The shadow that a satellite on a circular orbit is in or enters next: begin and end [s from now], of a shadow
+    /// without penumbra. None where the orbit has none. The begin is negative within one.
+    ///
+    /// With u the angle along the orbit from the point nearest to the Sun, r̂·ŝ = cos β·cos u, and the Earth hides the
+    /// Sun where that is below -√(1 - (R/r)²).
+    #[must_use]
+    pub fn next_shadow_s(&self, r_BN_N: &Vector3<f64>, v_BN_N: &Vector3<f64>) -> Option<(f64, f64)> {
+        use std::f64::consts::{PI, TAU};
+        let radius = r_BN_N.norm();
+        let (up, along) = (r_BN_N / radius, v_BN_N.normalize());
+        let (a, b) = (up.dot(&self.direction_N), along.dot(&self.direction_N));
+        let cos_beta = (a * a + b * b).sqrt();
+        let limit = (1.0 - (self.earth_radius / radius) * (self.earth_radius / radius)).max(0.0).sqrt();
+        if limit >= cos_beta {
+            return None;
+        }
+        let half = libm::acos(limit / cos_beta);
+        let mean_motion = v_BN_N.norm() / radius;
+        // The middle of the shadow lies half a turn from the point nearest to the Sun, which is atan2(b, a) ahead.
+        let end = libm::atan2(b, a) + PI + half;
+        // The first end that is still to come.
+        let middle = end - (end / TAU).ceil() * TAU + TAU - half;
+        Some(((middle - half) / mean_motion, (middle + half) / mean_motion))
+    }
+
     /// Share of the Sun's disc that the Earth's leaves free: a and b are their apparent radii, c their distance.
     #[cold]
     fn seen_disc(&self, r_BN_N: &Vector3<f64>) -> f64 {
@@ -89,11 +114,12 @@ impl Sun {
         } else if c < a - b {
             1.0 - (b / a) * (b / a)
         } else if c < a + b {
+            // Angles from both legs, and the height by Heron's formula: the usual arc cosines lose half the digits here.
             let x = (c * c + a * a - b * b) / (2.0 * c);
-            let y = (a * a - x * x).max(0.0).sqrt();
-            let half_angle = |part: f64| libm::acos(part.clamp(-1.0, 1.0));
-            let hidden = a * a * half_angle(x / a) + b * b * half_angle((c - x) / b) - c * y;
-            1.0 - hidden / (std::f64::consts::PI * a * a)
+            let product = (a + b + c) * (a + b - c) * (c + a - b) * (c + b - a);
+            let y = product.max(0.0).sqrt() / (2.0 * c);
+            let hidden = a * a * libm::atan2(y, x) + b * b * libm::atan2(y, c - x) - c * y;
+            (1.0 - hidden / (std::f64::consts::PI * a * a)).clamp(0.0, 1.0)
         } else {
             1.0
         }
@@ -138,6 +164,31 @@ mod tests {
         }
         // The Sun's disc of 0.53° passes twice: 200 000/360·0.53·2, more slowly because the edge is slanted.
         assert!((590..900).contains(&partial), "{partial}");
+    }
+
+    #[test]
+    fn the_next_shadow_is_where_half_the_sun_is_hidden() {
+        let sun = Sun::at(75.0, 10.0, 1.0, EARTH);
+        let (radius, speed) = (EARTH + 520e3, 7601.4);
+        let n = speed / radius;
+        let (x, y) = (Vector3::new(0.0, 0.8, 0.6), Vector3::new(1.0, 0.0, 0.0));
+        let at = |t: f64| {
+            let (s, c) = libm::sincos(n * t);
+            ((x * c + y * s) * radius, (y * c - x * s) * speed)
+        };
+        for k in 0..400 {
+            let t = f64::from(k) * 30.0;
+            let (r_BN_N, v_BN_N) = at(t);
+            let (begin, end) = sun.next_shadow_s(&r_BN_N, &v_BN_N).unwrap();
+            assert!(begin < end && end > 0.0 && end <= std::f64::consts::TAU / n, "{begin} {end}");
+            let within = sun.illumination(&at(t + 0.5 * (begin + end)).0);
+            let (before, after) = (sun.illumination(&at(t + begin - 15.0).0), sun.illumination(&at(t + end + 15.0).0));
+            assert_eq!((within, before, after), (0.0, 1.0, 1.0));
+            let edge = sun.illumination(&at(t + begin).0);
+            assert!((0.3..0.7).contains(&edge), "{edge}");
+        }
+        let beside = Sun::at(0.0, 90.0, 1.0, EARTH);
+        assert_eq!(beside.next_shadow_s(&Vector3::new(radius, 0.0, 0.0), &Vector3::new(0.0, speed, 0.0)), None);
     }
 
     #[test]

@@ -5,6 +5,8 @@
 mod regress_ground;
 mod regress_missions;
 mod regress_plant_errors;
+mod regress_resources;
 mod val_basilisk;
+mod val_basilisk_resources;
 mod val_paper_construction;
 mod val_paper_operating_points;

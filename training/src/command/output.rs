@@ -58,9 +58,13 @@ fn writable(path: &Path) -> std::io::Result<()> {
     }
 }
 
+/// Prints a text to standard output; that nobody reads it, as behind `head`, is no reason to stop.
 pub fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).context("cannot write to standard output")
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("cannot write to standard output"),
+    }
 }
 
 /// Says something on standard error; that nobody listens is no reason to give up.

@@ -1,8 +1,12 @@
 //! What can be asked over HTTP, as JSON in and out; the page and programs ask the same.
 
-use anyhow::{Context, Result as Answer};
+use std::path::PathBuf;
+
+use anyhow::Result as Answer;
 use serde::{Deserialize, Serialize};
-use swath_mission::orders::geojson::{Import, Lengths, import};
+use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::formats;
+use swath_mission::orders::import::{Import, import_features};
 use swath_mission::orders::order::Order;
 use swath_mission::requests::lifecycle::State;
 use swath_msgs::swath_msgs as msg;
@@ -163,18 +167,11 @@ fn opportunity(it: &msg::Opportunity) -> Opportunity {
 fn orders(submission: &Submission) -> Result<Import, Problem> {
     let stem: String = submission.name.chars().filter(|c| c.is_alphanumeric() || "-_ ".contains(*c)).take(60).collect();
     let stem = if stem.trim().is_empty() { "console".to_owned() } else { stem };
-    let read = || -> Answer<Import> {
-        // The reader of orders takes files.
-        let folder = tempfile::tempdir().context("cannot make a temporary file")?;
-        let path = folder.path().join(format!("{stem}.geojson"));
-        std::fs::write(&path, submission.geojson.to_string()).context("cannot write a temporary file")?;
-        Ok(import(&path, Lengths::of(&SimConfig::default()))?)
-    };
-    let mut import = read().map_err(|error| {
-        let cause = error.root_cause().to_string();
-        Problem::bad(format!("{} is not GeoJSON: {cause}", submission.name))
-    })?;
-    for order in &mut import.requests {
+    let path = PathBuf::from(format!("{stem}.geojson"));
+    let features = formats::read(submission.geojson.to_string().as_bytes(), &path)
+        .map_err(|why| Problem::bad(format!("{} {why}", submission.name)))?;
+    let mut import = import_features(features, &path, &Cutting::of(&SimConfig::default()));
+    for order in &mut import.orders {
         if order.submitter == swath_mission::orders::order::MISSION {
             ACTOR.clone_into(&mut order.submitter);
         }
@@ -183,12 +180,12 @@ fn orders(submission: &Submission) -> Result<Import, Problem> {
 }
 
 fn features_refused(import: &Import) -> impl Iterator<Item = Outcome> + '_ {
-    import.refused.iter().map(|(feature, reason)| Outcome {
-        name: format!("feature {feature}"),
+    import.refused.iter().map(|fault| Outcome {
+        name: format!("feature {}", fault.feature),
         accepted: false,
         id: 0,
         reason_code: 0,
-        reason: reason.clone(),
+        reason: fault.reason.clone(),
     })
 }
 
@@ -199,7 +196,7 @@ fn features_refused(import: &Import) -> impl Iterator<Item = Outcome> + '_ {
 pub async fn submit(counter: &Counter, submission: Submission) -> Result<Vec<Outcome>, Problem> {
     let import = orders(&submission)?;
     let mut outcomes: Vec<_> = features_refused(&import).collect();
-    let requests = import.requests;
+    let requests = import.orders;
     let answered = counter.ask(move |desks| {
         let mut answered = Vec::new();
         for batch in requests.chunks(BATCH) {
@@ -226,7 +223,7 @@ pub async fn submit(counter: &Counter, submission: Submission) -> Result<Vec<Out
 /// When they are no GeoJSON or too many, or the mission does not answer.
 pub async fn preview(counter: &Counter, submission: Submission) -> Result<Vec<Preview>, Problem> {
     let import = orders(&submission)?;
-    let count = import.requests.len();
+    let count = import.orders.len();
     if count > PREVIEWS {
         return Err(Problem::bad(format!("{count} strips, the limit of a preview is {PREVIEWS}; submit takes more")));
     }
@@ -237,7 +234,7 @@ pub async fn preview(counter: &Counter, submission: Submission) -> Result<Vec<Pr
         opportunities: Vec::new(),
     });
     let mut previews: Vec<_> = refused.collect();
-    let requests: Vec<Order> = import.requests;
+    let requests: Vec<Order> = import.orders;
     let answered = counter.ask(move |desks| {
         let one = |order: &Order| -> Answer<Preview> {
             let asked = msg::PreviewStripRequest { id: 0, request: request_message(order), horizon_s: 0.0 };

@@ -1,10 +1,11 @@
 //! A recorded mission, read from its bag: what was asked for and when, what was decided, and what came of it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
 use swath_bags::cli::{MANIFEST, MANIFEST_TEXT};
 use swath_bags::schema::{Schema, adapt};
 use swath_bags::{Bag, Filter, TopicPattern};
@@ -26,6 +27,32 @@ use swath_node::orders::{action, request_of_strip};
 
 /// The namespace in which a mission's nodes run unless they are told otherwise.
 pub const NAMESPACE: &str = "/swath";
+
+/// Which recording, and of what.
+#[derive(Debug, Args)]
+pub struct RecordedArgs {
+    /// Bag directory or file of a mission
+    pub bag: PathBuf,
+    /// Mission file, for a bag without a manifest: one of `ros2 bag record`, or a converted one
+    #[arg(long, value_name = "FILE")]
+    pub mission: Option<PathBuf>,
+    /// Namespace of the mission's nodes
+    #[arg(long, default_value = NAMESPACE)]
+    pub namespace: String,
+}
+
+impl RecordedArgs {
+    /// Reads the mission.
+    ///
+    /// # Errors
+    /// As [`Recorded::open`] and [`Recorded::open_of_mission`].
+    pub fn open(&self) -> Result<Recorded> {
+        match &self.mission {
+            Some(mission) => Recorded::open_of_mission(&self.bag, &self.namespace, mission),
+            None => Recorded::open(&self.bag, &self.namespace),
+        }
+    }
+}
 
 /// A mission as its bag tells it.
 pub struct Recorded {
@@ -55,6 +82,19 @@ impl Recorded {
     pub fn open(path: &Path, namespace: &str) -> Result<Self> {
         let bag = Bag::open(path)?;
         let mission = mission_of(&bag).with_context(|| format!("{} holds no mission", path.display()))?;
+        Self::read(bag, namespace, mission)
+    }
+
+    /// The same from a bag without a manifest, such as others record, of a mission whose file is known.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and when the mission file cannot be used.
+    pub fn open_of_mission(path: &Path, namespace: &str, mission: &Path) -> Result<Self> {
+        let bag = Bag::open(path)?;
+        Self::read(bag, namespace, without_files(Mission::read(mission)?))
+    }
+
+    fn read(bag: Bag, namespace: &str, mission: Mission) -> Result<Self> {
         let model = Arc::new(mission.model()?);
         let mut recorded = Self {
             bag,
@@ -113,7 +153,7 @@ impl Recorded {
         let mut messages = self.bag.messages(&Filter { topics, ..Filter::default() })?;
         while let Some(message) = messages.next()? {
             let time = message.log_time;
-            let data = if then == own { message.data.to_vec() } else { adapt(&then, &own, &message.data)? };
+            let data = if then == own { message.data.to_vec() } else { adapt(&then, &own, message.data)? };
             let read = decode(&Cdr::from_bytes(data));
             each(read.with_context(|| format!("{name} at {time} ns"))?)?;
         }
@@ -251,13 +291,19 @@ impl Recorded {
     }
 }
 
-/// The mission in a bag's manifest, without its files of requests: they need not be there any more.
+/// The mission in a bag's manifest.
 fn mission_of(bag: &Bag) -> Result<Mission> {
-    let manifest = bag.metadata_named(MANIFEST).with_context(|| format!("no metadata record {MANIFEST}"))?;
+    let missing = || format!("no metadata record {MANIFEST}; --mission says which was flown");
+    let manifest = bag.metadata_named(MANIFEST).with_context(missing)?;
     let text = manifest.get(MANIFEST_TEXT).with_context(|| format!("{MANIFEST} has no entry {MANIFEST_TEXT}"))?;
     let mission: Mission = toml::from_str(text).with_context(|| format!("{MANIFEST} is no mission"))?;
-    let requests = MissionRequests { max_attempts: mission.requests.max_attempts, ..MissionRequests::default() };
-    let mission = Mission { requests, ..mission };
+    let mission = without_files(mission);
     mission.validate()?;
     Ok(mission)
+}
+
+/// A mission without its files of requests: they need not be there any more, the bag tells what was asked for.
+fn without_files(mission: Mission) -> Mission {
+    let requests = MissionRequests { max_attempts: mission.requests.max_attempts, ..MissionRequests::default() };
+    Mission { requests, ..mission }
 }

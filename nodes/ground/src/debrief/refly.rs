@@ -13,12 +13,13 @@ use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, Plann
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::Tick;
 
-use super::recorded::{NAMESPACE, Recorded};
+use super::recorded::{Recorded, RecordedArgs};
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::action::{Act, Action};
 use swath_mission::outcome::TaskLine;
+use swath_node::out;
 
 /// Arguments of `refly`.
 #[derive(Debug, Args)]
@@ -30,14 +31,11 @@ Takes configuration, seed and requests with their arrival times from the bag. Wi
 the tasks of a mission that was flown in lockstep are the recorded ones byte by byte; the exit code is 1 when
 they are not.")]
 pub struct ReflyArgs {
-    /// Bag directory or .mcap file of a mission
-    bag: PathBuf,
+    #[command(flatten)]
+    recorded: RecordedArgs,
     /// Planner instead of the recorded one
     #[arg(long)]
     planner: Option<PlannerSpec>,
-    /// Namespace of the mission's nodes
-    #[arg(long, default_value = NAMESPACE)]
-    namespace: String,
     /// Write the tasks flown now, as `tasks.jsonl` of a launch
     #[arg(long, value_name = "FILE")]
     tasks: Option<PathBuf>,
@@ -101,9 +99,8 @@ impl ReflyArgs {
     ///
     /// # Errors
     /// When the bag holds no mission from its beginning, or the planner fails.
-    #[expect(clippy::print_stdout, reason = "the comparison is this command's result")]
     pub fn run(self, policies: &Policies) -> Result<ExitCode> {
-        let recorded = Recorded::open(&self.bag, &self.namespace)?;
+        let recorded = self.recorded.open()?;
         let own = recorded.mission.planner.clone();
         let planner = self.planner.unwrap_or_else(|| own.clone());
         let flown = fly(&recorded, &planner, policies)?;
@@ -113,9 +110,9 @@ impl ReflyArgs {
         }
         let comparison = compare(&recorded, &flown, &planner)?;
         match self.json {
-            true => println!("{}", serde_json::to_string_pretty(&comparison)?),
-            false => print!("{}", comparison.text()),
-        }
+            true => out::print_line(serde_json::to_string_pretty(&comparison)?)?,
+            false => out::print(&comparison.text())?,
+        };
         let as_it_should_be = comparison.identical || planner != own;
         Ok(if as_it_should_be { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }

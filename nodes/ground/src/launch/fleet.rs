@@ -90,7 +90,7 @@ impl Fleet {
                     let start = Command::new(path).args(args).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
                     member.child = start.with_context(|| format!("cannot start node {} again", member.name))?;
                 }
-                _ => bail!("node {} has ended ({status}); the reason is above", member.name),
+                _ => bail!("{} before the mission was over", ending(&member.name, status)),
             }
         }
         Ok(())
@@ -108,7 +108,7 @@ impl Fleet {
             let mut member = self.members.swap_remove(at);
             let status = stop(&mut member.child)?;
             if !status.success() {
-                bail!("node {name} ended with {status}; the reason is above");
+                bail!("{}", ending(name, status));
             }
         }
         Ok(())
@@ -124,6 +124,16 @@ impl Drop for Fleet {
             // Nothing more can be done for a process that cannot be ended.
             let _ = stop(&mut member.child);
         }
+    }
+}
+
+/// How a process has ended, in words. One that fails says why by itself; one that is killed cannot.
+fn ending(name: &str, status: ExitStatus) -> String {
+    match (status.code(), status.signal()) {
+        (Some(0), _) => format!("node {name} has ended"),
+        (Some(code), _) => format!("node {name} has failed (exit code {code}; it has said why)"),
+        (None, Some(signal)) => format!("node {name} was killed by signal {signal}"),
+        (None, None) => format!("node {name} has ended ({status})"),
     }
 }
 

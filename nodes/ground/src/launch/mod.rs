@@ -6,21 +6,25 @@ mod over_dds;
 mod progress;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Error, Result, bail};
 use clap::Args;
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::task::Totals;
+use swath_sim::time::Tick;
 
-use output::OutputFolder;
+use output::{Flown, OutputFolder};
 use progress::Progress;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::file::Mission;
-use swath_mission::guarded::{GuardedPlanner, Policies};
+use swath_mission::guarded::{GuardedPlanner, Policies, made_instead};
 use swath_mission::in_process::InProcessMission;
+use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
+use swath_node::out;
 
 /// `swath launch`.
 #[derive(Debug, Args)]
@@ -39,7 +43,7 @@ pub struct LaunchArgs {
     #[arg(long)]
     pub no_bag: bool,
     /// Length [orbits] instead of the mission's.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub orbits: Option<f64>,
     /// Number of random strips instead of the mission's.
     #[arg(long)]
@@ -51,7 +55,7 @@ pub struct LaunchArgs {
     #[arg(long)]
     pub seed: Option<u64>,
     /// 0: lockstep; 1: real time; x: x times real time; instead of the mission's.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub pace: Option<f64>,
     /// Print the summary as JSON instead of a table.
     #[arg(long)]
@@ -83,37 +87,76 @@ impl LaunchArgs {
     }
 }
 
+/// The exit code of a mission that was flown, but not by the planner that was asked for.
+const NOT_AS_ASKED: u8 = 3;
+
 /// Flies a mission and prints its summary.
 ///
+/// The exit code is 3 when the heuristic decided in the place of the planner that was asked for.
+///
 /// # Errors
-/// When the mission is not valid, a node fails or never comes up, or an output cannot be written.
-#[expect(clippy::print_stdout, reason = "the summary is this command's result")]
-pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<()> {
+/// When the mission is not valid, a node fails or never comes up, or an output cannot be written. What was flown until
+/// then is in the outputs; where nothing was, there are none.
+pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
-    let requests = mission.initial_requests()?;
+    if mission.sim.resources.is_some() && !args.in_process {
+        bail!("a mission with [resources] flies in one process only: add --in-process");
+    }
+    for unseen in mission.stations_never_seen()? {
+        tracing::warn!("{unseen}");
+    }
+    let (requests, faults) = mission.initial_requests()?;
+    faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
-    let mission_file = output.write_mission(&mission, &requests)?;
-    // What is flown is what was written: nodes, in-process missions and re-flights read the same file.
-    let mission = Mission::read(&mission_file)?;
-    let summary = if args.in_process {
-        fly_in_process(&mission, &mut output, policies)?
-    } else {
-        over_dds::fly(&mission, &mission_file, &mut output, !args.no_bag, policies)?
+    let flown = fly(args, &mission, &requests, &mut output, policies);
+    let Flown { summary, failure } = match flown {
+        Ok(flown) => flown,
+        Err(error) => {
+            output.discard()?;
+            return Err(error);
+        }
     };
     output.write_summary(&summary)?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&summary)?);
+        out::print_line(serde_json::to_string_pretty(&summary)?)?;
     } else {
-        println!("{}\n  outputs              {}", summary.table().trim_end(), output.path().display());
+        out::print(&format!("{}\n  outputs              {}\n", summary.table().trim_end(), output.path().display()))?;
     }
-    Ok(())
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    match made_instead(&summary.deciders, &mission.planner) {
+        0 => Ok(ExitCode::SUCCESS),
+        count => {
+            out::say(format_args!("{count} decisions were not made by {}, which was asked for", mission.planner));
+            Ok(ExitCode::from(NOT_AS_ASKED))
+        }
+    }
 }
 
-fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Policies) -> Result<Summary> {
+/// Flies a mission; an error where nothing was flown.
+fn fly(
+    args: &LaunchArgs,
+    mission: &Mission,
+    requests: &[Order],
+    output: &mut OutputFolder,
+    policies: &Policies,
+) -> Result<Flown> {
+    let mission_file = output.write_mission(mission, requests)?;
+    // What is flown is what was written: nodes, in-process missions and re-flights read the same file.
+    let mission = Mission::read(&mission_file)?;
+    if args.in_process {
+        fly_in_process(&mission, output, policies)
+    } else {
+        over_dds::fly(&mission, &mission_file, output, !args.no_bag, policies)
+    }
+}
+
+fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Policies) -> Result<Flown> {
     let mut flight = InProcessMission::new(mission)?;
     let planner = GuardedPlanner::make(policies, &mission.planner, mission.seed);
     if let Some(reason) = planner.missing() {
-        tracing::error!("no planner {}: {reason}; {} takes over", mission.planner, planner.name());
+        out::say(format_args!("no planner {}: {reason}; {} takes over", mission.planner, planner.name()));
     }
     let period = flight.model().period;
     let mut planner = GatedPlanner { gate: Gate::new(&mission.approval, period), planner };
@@ -121,28 +164,32 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     let mut totals = Totals::default();
     let mut progress = Progress::new(horizon, period);
     let started = Instant::now();
-    let mut failed = None;
-    flight.run(&mut planner, |settled, line| {
+    let mut end = Tick(0);
+    let mut unwritten = None;
+    let outcome = flight.run(&mut planner, |settled, line| {
         totals.add(settled);
-        progress.task(settled.record.end, &totals);
+        end = settled.record.end;
+        progress.task(end, &totals);
         if let Err(error) = output.write_task(&line) {
-            failed.get_or_insert(error);
+            unwritten.get_or_insert(error);
         }
-    })?;
+    });
     progress.finish();
-    if let Some(error) = failed {
-        return Err(error).context("cannot write tasks.jsonl");
-    }
+    let failure = outcome.err().map(Error::from);
+    let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
+        deciders: planner.planner.deciders().clone(),
+        failure: failure.as_ref().map(out::chain),
         seed: mission.seed,
         orbits: mission.orbits,
-        ticks: horizon.0,
+        ticks: if failure.is_some() { end.0 } else { horizon.0 },
         wall_seconds: started.elapsed().as_secs_f64(),
         requests: requested as u64,
         accepted: accepted as u64,
+        resources: flight.resources(),
         ..SummaryInputs::default()
     };
-    Ok(Summary::new(inputs, &totals, period))
+    Ok(Flown { summary: Summary::new(inputs, &totals, period), failure })
 }

@@ -4,16 +4,26 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
 
 use swath_mission::file::{Mission, MissionRequests};
-use swath_mission::orders::geojson;
+use swath_mission::orders::import;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
+
+/// A mission that was flown, to its end or until something went wrong.
+pub struct Flown {
+    /// What came of it.
+    pub summary: Summary,
+    /// What went wrong.
+    pub failure: Option<Error>,
+}
 
 /// Where bag, tasks and summary go.
 pub struct OutputFolder {
     path: PathBuf,
+    /// Whether it was not there before.
+    made: bool,
     tasks: BufWriter<File>,
 }
 
@@ -24,6 +34,7 @@ impl OutputFolder {
             Some(path) => path.to_owned(),
             None => unused_name(mission),
         };
+        let made = !path.exists();
         fs::create_dir_all(&path).with_context(|| format!("cannot make output folder {}", path.display()))?;
         let mut entries = fs::read_dir(&path).with_context(|| format!("cannot read {}", path.display()))?;
         if entries.next().is_some() {
@@ -31,7 +42,22 @@ impl OutputFolder {
         }
         let tasks = path.join("tasks.jsonl");
         let tasks = File::create(&tasks).with_context(|| format!("cannot write {}", tasks.display()))?;
-        Ok(Self { path, tasks: BufWriter::new(tasks) })
+        Ok(Self { path, made, tasks: BufWriter::new(tasks) })
+    }
+
+    /// Removes all that is in the folder, so that it can be asked for again: nothing was flown.
+    pub fn discard(self) -> Result<()> {
+        let failed = || format!("cannot clear output folder {}", self.path.display());
+        for entry in fs::read_dir(&self.path).with_context(failed)? {
+            let entry = entry.with_context(failed)?;
+            let is_folder = entry.file_type().with_context(failed)?.is_dir();
+            let path = entry.path();
+            if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) }.with_context(failed)?;
+        }
+        match self.made {
+            true => fs::remove_dir(&self.path).with_context(failed),
+            false => Ok(()),
+        }
     }
 
     /// The folder.
@@ -41,7 +67,7 @@ impl OutputFolder {
 
     /// Writes the mission as it is flown: `mission.toml`, and all its requests in `requests.geojson` beside it.
     pub fn write_mission(&self, mission: &Mission, requests: &[Order]) -> Result<PathBuf> {
-        geojson::write(&self.path.join("requests.geojson"), requests)?;
+        import::write(&self.path.join("requests.geojson"), requests)?;
         let files = vec![PathBuf::from("requests.geojson")];
         let mission = Mission {
             requests: MissionRequests { files, random: None, ..mission.requests.clone() },

@@ -3,21 +3,20 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::DiagnosticArray;
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::task_record;
+use swath_node::out;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph};
 use swath_sim::model::Model;
-use swath_sim::task::Totals;
-
 use swath_sim::time::Tick;
 
 use super::fleet::Fleet;
-use super::output::OutputFolder;
+use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use swath_mission::file::Mission;
-use swath_mission::guarded::Policies;
+use swath_mission::guarded::{Deciders, Policies};
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
@@ -29,14 +28,14 @@ const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 const SUMMARY_TIMEOUT: Duration = Duration::from_secs(5);
 const WAIT: Duration = Duration::from_millis(100);
 
-/// Flies a mission over DDS.
+/// Flies a mission over DDS; an error where nothing was flown.
 pub fn fly(
     mission: &Mission,
     mission_file: &Path,
     output: &mut OutputFolder,
     record: bool,
     policies: &Policies,
-) -> Result<Summary> {
+) -> Result<Flown> {
     let mut launcher = Launcher::start(mission)?;
     let mut fleet = Fleet::default();
     if record {
@@ -48,24 +47,39 @@ pub fn fly(
     }
     start_nodes(&mut fleet, mission_file, output, record)?;
     let nodes = fleet.processes();
-    let flown = launcher.watch(&mut fleet, output)?;
+    let watched = launcher.watch(&mut fleet, output);
+    let Some(flown) = launcher.flown else {
+        return Err(watched.err().unwrap_or_else(|| anyhow!("the mission has not begun")));
+    };
     // The recorder ends first: the nodes' last messages reach it while they are still there.
-    fleet.stop(&[graph::RECORDER])?;
-    fleet.stop(&graph::FLIGHT_NODES)?;
-    let messages_recorded = if record { count_messages(&output.path().join("bag"))? } else { 0 };
+    let recorded = fleet.stop(&[graph::RECORDER]).and_then(|()| match record {
+        true => count_messages(&output.path().join("bag")),
+        false => Ok(0),
+    });
+    let ended = fleet.stop(&graph::FLIGHT_NODES);
+    drop(fleet);
+    let (messages_recorded, unrecorded) = match recorded {
+        Ok(count) => (count, None),
+        Err(error) => (0, Some(error)),
+    };
+    // The first of them is the cause of the others.
+    let failure = watched.err().or(unrecorded).or(ended.err());
     let model = mission.model()?;
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
+        deciders: launcher.deciders.clone(),
+        failure: failure.as_ref().map(out::chain),
         seed: mission.seed,
         orbits: mission.orbits,
         ticks: flown.end.0,
-        wall_seconds: flown.wall.as_secs_f64(),
-        requests: mission.initial_requests()?.len() as u64,
+        wall_seconds: (flown.last - flown.began).as_secs_f64(),
+        requests: mission.initial_requests()?.0.len() as u64,
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,
+        resources: None,
     };
-    Ok(Summary::new(inputs, &flown.totals, model.period))
+    Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure })
 }
 
 /// What the manifest of the bag tells besides the mission.
@@ -117,6 +131,12 @@ struct Launcher {
     results: Subscription<msg::TaskResult>,
     summary: Subscription<msg::RequestSummary>,
     diagnostics: Subscription<DiagnosticArray>,
+    decisions: Subscription<msg::Decision>,
+    /// The last task that was decided on, and who decided on all.
+    decided: Option<u64>,
+    deciders: Deciders,
+    /// Nothing before the first decision point.
+    flown: Option<Reached>,
     model: Model,
     horizon: Tick,
     log: TaskLog,
@@ -124,10 +144,12 @@ struct Launcher {
     paced: bool,
 }
 
-struct Flown {
+/// How far the mission has come.
+#[derive(Clone, Copy)]
+struct Reached {
     end: Tick,
-    wall: Duration,
-    totals: Totals,
+    began: Instant,
+    last: Instant,
 }
 
 impl Launcher {
@@ -141,6 +163,10 @@ impl Launcher {
             results: node.subscription(&graph::TASK_RESULTS)?,
             summary: node.subscription(&graph::REQUEST_SUMMARY)?,
             diagnostics: node.subscription(&graph::DIAGNOSTICS)?,
+            decisions: node.subscription(&graph::PLANNER_DECISION)?,
+            decided: None,
+            deciders: Deciders::new(),
+            flown: None,
             horizon: mission.horizon(&model),
             model,
             log: TaskLog::default(),
@@ -150,27 +176,35 @@ impl Launcher {
         })
     }
 
-    fn watch(&mut self, fleet: &mut Fleet, output: &mut OutputFolder) -> Result<Flown> {
+    /// Follows the mission to its end.
+    fn watch(&mut self, fleet: &mut Fleet, output: &mut OutputFolder) -> Result<()> {
         let mut progress = Progress::new(self.horizon, self.model.period);
-        let mut started = None;
+        let outcome = self.follow(fleet, output, &mut progress);
+        progress.finish();
+        let over = outcome.and_then(|()| self.wait_for_the_ground(output));
+        // What had come until then is kept.
+        over.or_else(|error| {
+            self.log.give_up();
+            self.take_rest(output).and(Err(error))
+        })
+    }
+
+    fn follow(&mut self, fleet: &mut Fleet, output: &mut OutputFolder, progress: &mut Progress) -> Result<()> {
         let mut last_news = Instant::now();
         loop {
             if self.shutdown.asked() {
-                progress.finish();
                 bail!("interrupted");
             }
             while let Some(point) = self.points.take()? {
                 last_news = Instant::now();
-                let began = *started.get_or_insert(last_news);
+                let (end, began) = (Tick(point.tick), self.flown.map_or(last_news, |flown| flown.began));
+                self.flown = Some(Reached { end, began, last: last_news });
                 if let Some(result) = point.result.first() {
                     self.log.flown(task_record(result)?, &result.strip_name);
                 }
-                progress.task(Tick(point.tick), self.log.totals());
+                progress.task(end, self.log.totals());
                 if point.mission_over {
-                    progress.finish();
-                    self.wait_for_the_ground(Tick(point.tick), output)?;
-                    let (end, wall, totals) = (Tick(point.tick), last_news - began, *self.log.totals());
-                    return Ok(Flown { end, wall, totals });
+                    return Ok(());
                 }
             }
             while let Some(status) = self.status.take()? {
@@ -197,6 +231,13 @@ impl Launcher {
         for (_, line) in self.log.take() {
             output.write_task(&line).context("cannot write tasks.jsonl")?;
         }
+        while let Some(decision) = self.decisions.take()? {
+            // A question that is asked again is answered again.
+            if self.decided.is_none_or(|last| last < decision.task) {
+                self.decided = Some(decision.task);
+                *self.deciders.entry(decision.planner).or_insert(0) += 1;
+            }
+        }
         while let Some(summary) = self.summary.take()? {
             self.last_summary = Some(summary);
         }
@@ -209,7 +250,8 @@ impl Launcher {
     }
 
     /// Waits for the last rewards and the last summary of the request manager.
-    fn wait_for_the_ground(&mut self, end: Tick, output: &mut OutputFolder) -> Result<()> {
+    fn wait_for_the_ground(&mut self, output: &mut OutputFolder) -> Result<()> {
+        let end = self.flown.map_or(Tick(0), |flown| flown.end);
         let deadline = Instant::now() + SUMMARY_TIMEOUT;
         let behind = |it: &Self| it.last_summary.as_ref().is_none_or(|summary| summary.tick < end.0) || it.log.waits();
         while behind(self) && Instant::now() < deadline {

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use swath_sim::task::Totals;
 use swath_sim::time::{Tick, TickPeriod};
 
+use swath_node::out;
+
 /// A line that is rewritten on a terminal, and repeated now and then elsewhere.
 pub struct Progress {
     horizon: Tick,
@@ -59,7 +61,7 @@ impl Progress {
     /// Leaves the line.
     pub fn finish(&self) {
         if self.terminal && self.shown.is_some() {
-            eprintln!();
+            out::say("");
         }
     }
 }

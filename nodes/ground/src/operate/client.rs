@@ -36,10 +36,18 @@ impl Operator {
     /// # Errors
     /// When nobody serves it.
     pub fn desk<S: RosService>(&self, service: &graph::Service<S>) -> Result<Desk<S>> {
+        self.desk_within(service, TIMEOUT)
+    }
+
+    /// Finds a service that is there within some time.
+    ///
+    /// # Errors
+    /// When nobody serves it.
+    pub fn desk_within<S: RosService>(&self, service: &graph::Service<S>, patience: Duration) -> Result<Desk<S>> {
         let client = self.node.client(service)?;
         let node = service.entry.writers.first().unwrap_or(&"node");
         self.node
-            .wait_for_service(&client, TIMEOUT)
+            .wait_for_service(&client, patience)
             .with_context(|| format!("no {} is flying in this domain", node.replace('_', " ")))?;
         Ok(Desk { client })
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
@@ -54,19 +54,24 @@ pub fn export(args: &ExportArgs) -> Result<()> {
     match &args.out {
         Some(path) => {
             let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
-            write(everything, args.trail, BufWriter::new(file))
+            let written = write(everything, args.trail, BufWriter::new(file));
+            written.with_context(|| format!("cannot write {}", path.display()))
         }
-        None => write(everything, args.trail, std::io::stdout().lock()),
+        None => match write(everything, args.trail, std::io::stdout().lock()) {
+            // Whoever reads it has read enough.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+            written => written.context("cannot write to standard output"),
+        },
     }
 }
 
-fn write(everything: Everything, trail: bool, mut to: impl Write) -> Result<()> {
+fn write(everything: Everything, trail: bool, mut to: impl Write) -> std::io::Result<()> {
     let lines = everything.trail.iter().map(history_json);
     if trail {
         for line in lines {
             writeln!(to, "{line}")?;
         }
-        return Ok(to.flush()?);
+        return to.flush();
     }
     let mut histories: BTreeMap<u64, Vec<Value>> = BTreeMap::new();
     for (line, entry) in lines.zip(&everything.trail) {
@@ -79,7 +84,7 @@ fn write(everything: Everything, trail: bool, mut to: impl Write) -> Result<()> 
         writeln!(to, "{feature}{}", if i + 1 < count { "," } else { "" })?;
     }
     writeln!(to, "]}}")?;
-    Ok(to.flush()?)
+    to.flush()
 }
 
 fn from_mission() -> Result<Everything> {

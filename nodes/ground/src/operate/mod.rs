@@ -1,16 +1,17 @@
 //! `swath strips` and `swath planner`: an operator's command line to a flying mission.
 
 mod client;
+mod cover;
 mod export;
+mod files;
 mod planner;
 mod query;
+mod selection;
 mod show;
 mod submit;
 mod watch;
 
 pub use planner::{PlannerArgs, run as run_planner};
-
-use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -24,9 +25,14 @@ pub struct StripsArgs {
 
 #[derive(Debug, Subcommand)]
 enum StripsCommand {
-    /// Submit the strips of GeoJSON files; exits with 1 when one of them is refused.
+    /// Submit the lines and areas of files as strips; exits with 1 when one of them is refused.
     #[command(after_help = "Example: swath strips submit examples/requests/rivers.geojson --submitter ops")]
     Submit(submit::SubmitArgs),
+    /// Make strips of the lines and areas of files, without a mission.
+    #[command(after_help = "Examples:
+  swath strips cover examples/requests/flood.geojson --out strips.geojson
+  ogr2ogr -f GeoJSONSeq /vsistdout/ lakes.gpkg | swath strips cover - --heading-deg 10")]
+    Cover(cover::CoverArgs),
     /// Say when strips of a file, or a known one, could be imaged.
     #[command(after_help = "Example: swath strips preview examples/requests/fires.geojson --hours 6")]
     Preview(query::PreviewArgs),
@@ -37,7 +43,7 @@ enum StripsCommand {
     Show(query::ShowArgs),
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
-    /// Replace a strip by the one of a GeoJSON file.
+    /// Replace a strip by the one of a file.
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),
@@ -53,17 +59,6 @@ enum StripsCommand {
     Export(export::ExportArgs),
 }
 
-/// Who acts.
-#[derive(Debug, Args)]
-struct Actor {
-    /// Who asks for it.
-    #[arg(long, default_value = "operator")]
-    actor: String,
-    /// Why.
-    #[arg(long, default_value = "")]
-    reason: String,
-}
-
 /// Runs `swath strips`.
 ///
 /// # Errors
@@ -72,6 +67,7 @@ pub fn run_strips(args: &StripsArgs) -> Result<()> {
     use swath_msgs::swath_msgs::ReviewStripsRequest as Review;
     match &args.command {
         StripsCommand::Submit(args) => submit::submit(args),
+        StripsCommand::Cover(args) => cover::cover(args),
         StripsCommand::Preview(args) => query::preview(args),
         StripsCommand::List(args) => query::list(args),
         StripsCommand::Show(args) => query::show(args),
@@ -83,23 +79,4 @@ pub fn run_strips(args: &StripsArgs) -> Result<()> {
         StripsCommand::Watch(args) => watch::watch(args),
         StripsCommand::Export(args) => export::export(args),
     }
-}
-
-/// Reads the strips of GeoJSON files; features that are no strips are told on stderr.
-fn read_files(
-    files: &[PathBuf],
-    lengths: swath_mission::orders::geojson::Lengths,
-) -> Result<swath_mission::orders::geojson::Import> {
-    let mut all = swath_mission::orders::geojson::Import::default();
-    for file in files {
-        let import = swath_mission::orders::geojson::import(file, lengths)?;
-        for (feature, reason) in &import.refused {
-            eprintln!("requests {}, feature {feature}: {reason}", file.display());
-        }
-        all.lines += import.lines;
-        all.requests.extend(import.requests);
-        all.cut.extend(import.cut);
-        all.refused.extend(import.refused);
-    }
-    Ok(all)
 }

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::json;
 use swath_msgs::swath_msgs as msg;
+use swath_node::out;
 use swath_ros::graph;
 
 use super::client::Operator;
@@ -64,7 +65,6 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 ///
 /// # Errors
 /// When the planner does not answer or refuses.
-#[expect(clippy::print_stdout, reason = "the answer is this command's result")]
 pub fn run(args: &PlannerArgs) -> Result<()> {
     let operator = Operator::start()?;
     match &args.command {
@@ -80,7 +80,7 @@ pub fn run(args: &PlannerArgs) -> Result<()> {
                 bail!("{}", answer.reason);
             }
             let name = mode_name(number);
-            println!("{}", if args.json { json!({ "mode": name }).to_string() } else { format!("mode {name}") });
+            out::print_line(if args.json { json!({ "mode": name }).to_string() } else { format!("mode {name}") })?;
         }
         PlannerCommand::Approve { proposal } => review(&operator, args, *proposal, true)?,
         PlannerCommand::Reject { proposal } => review(&operator, args, *proposal, false)?,
@@ -88,17 +88,13 @@ pub fn run(args: &PlannerArgs) -> Result<()> {
             let statuses = operator.node.subscription(&graph::PLANNER_STATUS)?;
             let status = statuses.newest(operator.node.signal(), TIMEOUT)?;
             let status = status.context("no planner is flying in this domain")?;
-            if args.json {
-                println!("{}", status_json(&status));
-            } else {
-                print!("{}", status_text(&status));
-            }
+            let text = if args.json { format!("{}\n", status_json(&status)) } else { status_text(&status) };
+            out::print(&text)?;
         }
     }
     Ok(())
 }
 
-#[expect(clippy::print_stdout, reason = "the answer is this command's result")]
 fn review(operator: &Operator, args: &PlannerArgs, proposal: u64, approve: bool) -> Result<()> {
     // No proposal has that number.
     let nothing = msg::ReviewProposalRequest { proposal: u64::MAX, ..Default::default() };
@@ -108,11 +104,10 @@ fn review(operator: &Operator, args: &PlannerArgs, proposal: u64, approve: bool)
         bail!("{}", answer.reason);
     }
     let verb = if approve { "approved" } else { "rejected" };
-    if args.json {
-        println!("{}", json!({ "proposal": answer.proposal, "approved": approve }));
-    } else {
-        println!("{verb} proposal {}", answer.proposal);
-    }
+    out::print_line(match args.json {
+        true => json!({ "proposal": answer.proposal, "approved": approve }).to_string(),
+        false => format!("{verb} proposal {}", answer.proposal),
+    })?;
     Ok(())
 }
 

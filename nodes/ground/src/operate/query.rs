@@ -8,24 +8,25 @@ use serde_json::json;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
-use swath_sim::config::SimConfig;
 
 use super::client::{Operator, check};
-use super::read_files;
+use super::files::{CuttingArgs, read_files};
+use super::selection::Common;
 use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
 use crate::requests::json::status_json;
-use swath_mission::orders::geojson::Lengths;
-use swath_mission::requests::index::Area;
 use swath_mission::requests::lifecycle::State;
 use swath_mission::time_text;
 use swath_node::orders::request_message;
+use swath_node::out;
 
 /// `swath strips preview`.
 #[derive(Debug, Args)]
 pub struct PreviewArgs {
-    /// GeoJSON files with strips that need not be submitted.
+    /// Files with lines and areas that need not be submitted.
     #[arg(required_unless_present = "id")]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    cutting: CuttingArgs,
     /// Number of a strip that is known instead.
     #[arg(long, conflicts_with = "files")]
     id: Option<u64>,
@@ -40,12 +41,8 @@ pub struct PreviewArgs {
 /// `swath strips list`.
 #[derive(Debug, Args)]
 pub struct ListArgs {
-    /// Only strips in this state, such as accepted or cancelled-by-user; may be repeated.
-    #[arg(long, value_parser = parse_state)]
-    state: Vec<State>,
-    /// Only strips that touch an area: south,north,west,east [deg].
-    #[arg(long, value_parser = parse_area, allow_hyphen_values = true)]
-    area: Option<Area>,
+    #[command(flatten)]
+    common: Common,
     /// Only strips that can be imaged at this time or later.
     #[arg(long, value_parser = time_text::parse)]
     from: Option<u64>,
@@ -80,62 +77,50 @@ pub struct ShowArgs {
     json: bool,
 }
 
-fn parse_state(name: &str) -> Result<State, String> {
-    State::from_name(name).ok_or_else(|| {
-        let names: Vec<_> = State::ALL.iter().map(|state| state.name().replace(' ', "-")).collect();
-        format!("expected one of {}", names.join(", "))
-    })
-}
-
-fn parse_area(text: &str) -> Result<Area, String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|number| number.trim().parse().ok()).collect();
-    match numbers[..] {
-        [south_deg, north_deg, west_deg, east_deg] if text.split(',').count() == 4 => {
-            Ok(Area { south_deg, north_deg, west_deg, east_deg })
-        }
-        _ => Err("expected four numbers: south,north,west,east".to_owned()),
-    }
-}
-
 /// Says when strips could be imaged.
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or a strip would be refused.
 #[expect(clippy::print_stdout, reason = "the answers are this command's result")]
 pub fn preview(args: &PreviewArgs) -> Result<()> {
-    let import = read_files(&args.files, Lengths::of(&SimConfig::default()))?;
+    let operator = Operator::start()?;
+    let import = read_files(&args.files, &args.cutting.of_mission(&operator)?)?;
     let horizon_s = args.hours.map_or(0.0, |hours| hours * 3600.0);
     let mut calls: Vec<_> = import
-        .requests
+        .orders
         .iter()
-        .map(|named| {
-            (named.name.clone(), msg::PreviewStripRequest { id: 0, request: request_message(named), horizon_s })
+        .map(|order| {
+            (order.name.clone(), msg::PreviewStripRequest { id: 0, request: request_message(order), horizon_s })
         })
         .collect();
     if let Some(id) = args.id {
         let call = msg::PreviewStripRequest { id, horizon_s, ..Default::default() };
         calls.push((format!("strip {id}"), call));
     }
-    let operator = Operator::start()?;
     let desk = operator.desk(&graph::PREVIEW_STRIP)?;
     let mut refused = 0;
     let count = calls.len();
     for (name, call) in calls {
         let answer = desk.call(call)?;
         refused += usize::from(answer.reason_code != 0);
-        if args.json {
+        let text = if args.json {
             let opportunities: Vec<_> = answer.opportunities.iter().map(opportunity_json).collect();
-            println!(
-                "{}",
-                json!({
-                    "name": name, "opportunities": opportunities,
-                    "reason_code": answer.reason_code, "reason": answer.reason,
-                })
-            );
+            let line = json!({
+                "name": name, "opportunities": opportunities,
+                "reason_code": answer.reason_code, "reason": answer.reason,
+            });
+            format!("{line}\n")
         } else if answer.reason_code != 0 {
-            println!("{name}: {} (reason {})", answer.reason, answer.reason_code);
+            format!("{name}: {} (reason {})\n", answer.reason, answer.reason_code)
+        } else if answer.opportunities.is_empty() {
+            let span =
+                args.hours.map_or("until the mission's end".to_owned(), |hours| format!("in the next {hours} h"));
+            format!("{name}: no chance {span}\n")
         } else {
-            print!("{name}\n{}", opportunity_table(&answer.opportunities));
+            format!("{name}\n{}", opportunity_table(&answer.opportunities))
+        };
+        if !out::print(&text)? {
+            break;
         }
     }
     if refused + import.refused.len() > 0 {
@@ -148,45 +133,70 @@ pub fn preview(args: &PreviewArgs) -> Result<()> {
 ///
 /// # Errors
 /// When nobody answers or a filter is refused.
-#[expect(clippy::print_stdout, reason = "the list is this command's result")]
 pub fn list(args: &ListArgs) -> Result<()> {
     let operator = Operator::start()?;
     let desk = operator.desk(&graph::LIST_STRIPS)?;
-    let area = args.area.unwrap_or(Area { south_deg: 0.0, north_deg: 0.0, west_deg: 0.0, east_deg: 0.0 });
     let at = |ns: Option<u64>| ns.map_or_else(Time::default, swath_ros::stamp);
     let mut call = msg::ListStripsRequest {
-        states: args.state.iter().map(|state| state.number()).collect::<Vec<_>>(),
-        in_area: args.area.is_some(),
-        south_deg: area.south_deg,
-        north_deg: area.north_deg,
-        west_deg: area.west_deg,
-        east_deg: area.east_deg,
         opportunity_from: at(args.from),
         opportunity_until: at(args.until),
         after_id: args.after,
-        limit: if args.limit == 0 { 100 } else { args.limit },
-        with_requests: false,
+        ..args.common.call()
     };
-    if !args.json {
-        println!("{}", status_head());
-    }
+    let mut left = if args.limit == 0 { usize::MAX } else { args.limit as usize };
+    let mut order = Standing::default();
+    let mut listening = args.json || out::print_line(status_head())?;
     loop {
         let page = desk.call(call.clone())?;
         check(page.reason_code, &page.reason)?;
-        for status in &page.strips {
-            if args.json {
-                println!("{}", status_json(status));
-            } else {
-                println!("{}", status_line(status));
-            }
+        let meant: Vec<_> = page.strips.iter().filter(|status| args.common.holds(status)).collect();
+        let more = page.more || meant.len() > left;
+        for status in meant.into_iter().take(left) {
+            let line = || if args.json { status_json(status).to_string() } else { status_line(status) };
+            listening = listening && out::print_line(line())?;
+            order.add(status);
+            left -= 1;
+            call.after_id = status.strip.id;
         }
-        call.after_id = page.strips.last().map_or(call.after_id, |status| status.strip.id);
-        if !page.more || args.limit != 0 {
-            if page.more && !args.json {
-                println!("there are more: --after {}", call.after_id);
-            }
-            return Ok(());
+        if left > 0 {
+            call.after_id = page.strips.last().map_or(call.after_id, |status| status.strip.id);
         }
+        if !more || left == 0 || !listening {
+            if more && listening && !args.json {
+                out::print_line(format_args!("there are more: --after {}", call.after_id))?;
+            }
+            break;
+        }
+    }
+    if args.common.is_one_order() && !args.json {
+        out::print_line(order.text())?;
+    }
+    Ok(())
+}
+
+/// How far the strips of one order are.
+#[derive(Default)]
+struct Standing {
+    strips: usize,
+    worth: f64,
+    imaged: f64,
+}
+
+impl Standing {
+    fn add(&mut self, status: &msg::StripStatus) {
+        // Of two directions of a strip, the second one is the same strip again.
+        if status.linked_to == 0 || status.linked_to > status.strip.id {
+            self.strips += 1;
+            self.worth += status.strip.priority;
+        }
+        if status.state == State::Completed.number() {
+            self.imaged += status.strip.priority;
+        }
+    }
+
+    fn text(&self) -> String {
+        let share = if self.worth > 0.0 { 100.0 * self.imaged / self.worth } else { 0.0 };
+        format!("{} strips, {share:.1} % of what they show is imaged", self.strips)
     }
 }
 
@@ -206,9 +216,9 @@ pub fn show(args: &ShowArgs) -> Result<()> {
     check(answer.reason_code, &answer.reason)?;
     let report = answer.report.first().context("the answer holds no report")?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&report_json(report))?);
+        out::print_line(serde_json::to_string_pretty(&report_json(report))?)?;
     } else {
-        print!("{}", report_text(report));
+        out::print(&report_text(report))?;
     }
     Ok(())
 }

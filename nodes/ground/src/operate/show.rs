@@ -3,23 +3,25 @@
 use anyhow::Result;
 use serde_json::{Value, json};
 use swath_msgs::swath_msgs as msg;
+use swath_node::out;
 
+use super::files::printable;
 use crate::requests::json::{history_json, state_name, status_json, time, time_json};
 
 /// Prints what became of a request or of what was asked of it.
-#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
 pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
-    if as_json {
+    let name = printable(name);
+    out::print_line(if as_json {
         let line = json!({
             "name": name, "accepted": result.accepted, "id": result.id,
             "reason_code": result.reason_code, "reason": result.reason,
         });
-        println!("{}", serde_json::to_string(&line)?);
+        line.to_string()
     } else if result.accepted {
-        println!("{done:<9} {:>7}  {name}", result.id);
+        format!("{done:<9} {:>7}  {name}", result.id)
     } else {
-        println!("refused   {:>7}  {name}: {} (reason {})", "-", result.reason, result.reason_code);
-    }
+        format!("refused   {:>7}  {name}: {} (reason {})", "-", printable(&result.reason), result.reason_code)
+    })?;
     Ok(())
 }
 

@@ -6,13 +6,13 @@ use anyhow::{Result, bail};
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
-use swath_sim::config::SimConfig;
 
 use super::client::{Operator, check};
+use super::files::{CuttingArgs, cut_json, cut_text, read_files, write_file};
+use super::selection::{Actor, Selection};
 use super::show::print_result;
-use super::{Actor, read_files};
-use swath_mission::orders::geojson::Lengths;
 use swath_node::orders::request_message;
+use swath_node::out;
 
 /// Requests in one call.
 const BATCH: usize = 500;
@@ -20,21 +20,23 @@ const BATCH: usize = 500;
 /// `swath strips submit`.
 #[derive(Debug, Args)]
 pub struct SubmitArgs {
-    /// GeoJSON files: LineString or MultiLineString features.
+    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT, CSV or shapefiles.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Who submits.
     #[arg(long, default_value = "operator")]
     submitter: String,
-    /// Lines longer than this become several strips [km].
-    #[arg(long, default_value_t = SimConfig::default().requests.length_max_km)]
-    max_length_km: f64,
+    #[command(flatten)]
+    cutting: CuttingArgs,
     /// Let all of them wait for approval.
     #[arg(long)]
     hold: bool,
     /// Only read and cut.
     #[arg(long)]
     dry_run: bool,
+    /// Write the strips to this file, as GeoJSON.
+    #[arg(short, long)]
+    out: Option<PathBuf>,
     /// Print the answers as JSON lines, the report last.
     #[arg(long)]
     json: bool,
@@ -43,9 +45,8 @@ pub struct SubmitArgs {
 /// `swath strips cancel`, `hold`, `release` and `reject`.
 #[derive(Debug, Args)]
 pub struct DecideArgs {
-    /// Numbers of the strips.
-    #[arg(required = true)]
-    ids: Vec<u64>,
+    #[command(flatten)]
+    strips: Selection,
     #[command(flatten)]
     actor: Actor,
     /// Print the answers as JSON lines.
@@ -58,8 +59,10 @@ pub struct DecideArgs {
 pub struct ReplaceArgs {
     /// Number of the strip.
     id: u64,
-    /// GeoJSON file with the strip that is wanted instead.
+    /// File with the strip that is wanted instead.
     file: PathBuf,
+    #[command(flatten)]
+    cutting: CuttingArgs,
     /// Who submits.
     #[arg(long, default_value = "operator")]
     submitter: String,
@@ -68,61 +71,55 @@ pub struct ReplaceArgs {
     json: bool,
 }
 
-fn lengths(longest_km: f64) -> Result<Lengths> {
-    if !(1.0..=5000.0).contains(&longest_km) {
-        bail!("--max-length-km is {longest_km}, outside 1 to 5000");
-    }
-    Ok(Lengths { longest_km, ..Lengths::of(&SimConfig::default()) })
-}
-
 /// Submits the strips of files, and reports what became of every line.
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or something is refused.
-#[expect(clippy::print_stdout, reason = "the report is this command's result")]
 pub fn submit(args: &SubmitArgs) -> Result<()> {
-    let mut import = read_files(&args.files, lengths(args.max_length_km)?)?;
-    for named in &mut import.requests {
-        named.submitter.clone_from(&args.submitter);
-        named.hold_for_approval |= args.hold;
+    let operator = if args.dry_run { None } else { Some(Operator::start()?) };
+    let cutting = match &operator {
+        Some(operator) => args.cutting.of_mission(operator)?,
+        None => args.cutting.of_any()?,
+    };
+    let mut import = read_files(&args.files, &cutting)?;
+    for order in &mut import.orders {
+        order.submitter.clone_from(&args.submitter);
+        order.hold_for_approval |= args.hold;
     }
-    let (lines, strips) = (import.lines, import.requests.len());
-    let pieces: usize = import.cut.iter().map(|(_, count)| count).sum();
+    if let Some(path) = &args.out {
+        write_file(path, &import)?;
+    }
+    let strips = import.orders.len();
     let (mut accepted, mut refused) = (0, 0);
-    if !args.dry_run && strips > 0 {
-        let operator = Operator::start()?;
+    if let Some(operator) = operator.filter(|_| strips > 0) {
         let desk = operator.desk(&graph::SUBMIT_STRIPS)?;
-        for batch in import.requests.chunks(BATCH) {
+        for batch in import.orders.chunks(BATCH) {
             let requests = batch.iter().map(request_message).collect::<Vec<_>>();
             let answer = desk.call(msg::SubmitStripsRequest { requests })?;
             check(answer.reason_code, &answer.reason)?;
-            for (named, result) in batch.iter().zip(&answer.results) {
+            for (order, result) in batch.iter().zip(&answer.results) {
                 *if result.accepted { &mut accepted } else { &mut refused } += 1;
-                print_result(&named.name, "accepted", result, args.json)?;
+                let done = if order.hold_for_approval { "held" } else { "accepted" };
+                print_result(&order.name, done, result, args.json)?;
             }
         }
     }
     if args.json {
-        let cut: Vec<_> =
-            import.cut.iter().map(|(name, count)| serde_json::json!({ "line": name, "strips": count })).collect();
         let report = serde_json::json!({
-            "lines": lines, "cut": cut, "strips": strips, "accepted": accepted, "refused": refused,
-            "features_refused": import.refused.len(),
+            "shapes": import.shapes, "cut": cut_json(&import.cut), "strips": strips, "accepted": accepted,
+            "refused": refused, "parts_refused": import.refused.len(),
         });
-        println!("{report}");
+        out::print_line(report)?;
     } else {
-        for (name, count) in &import.cut {
-            println!("cut       {name} into {count} strips of equal length");
-        }
-        println!(
-            "{lines} lines: {} as they are, {} cut into {pieces}; {strips} strips: {accepted} accepted, {refused} refused",
-            lines - import.cut.len(),
-            import.cut.len(),
-        );
+        out::print_line(format_args!(
+            "{}{} lines and areas: {strips} strips: {accepted} accepted, {refused} refused",
+            cut_text(&import.cut),
+            import.shapes,
+        ))?;
     }
     match refused + import.refused.len() {
         0 => Ok(()),
-        _ => bail!("{refused} of {strips} strips and {} features were refused", import.refused.len()),
+        _ => bail!("{refused} of {strips} strips and {} parts of files were refused", import.refused.len()),
     }
 }
 
@@ -133,10 +130,11 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
 pub fn cancel(args: &DecideArgs) -> Result<()> {
     let operator = Operator::start()?;
     let Actor { actor, reason } = &args.actor;
-    let call = msg::CancelStripsRequest { ids: args.ids.clone(), actor: actor.clone(), reason: reason.clone() };
+    let ids = args.strips.find(&operator)?;
+    let call = msg::CancelStripsRequest { ids: ids.clone(), actor: actor.clone(), reason: reason.clone() };
     let answer = operator.desk(&graph::CANCEL_STRIPS)?.call_once(Default::default(), call)?;
     check(answer.reason_code, &answer.reason)?;
-    tell(args, "cancelled", &answer.results)
+    tell(args, &ids, "cancelled", &answer.results)
 }
 
 /// Holds, releases or rejects strips.
@@ -146,7 +144,8 @@ pub fn cancel(args: &DecideArgs) -> Result<()> {
 pub fn review(args: &DecideArgs, action: u8) -> Result<()> {
     let operator = Operator::start()?;
     let Actor { actor, reason } = &args.actor;
-    let call = msg::ReviewStripsRequest { ids: args.ids.clone(), action, actor: actor.clone(), reason: reason.clone() };
+    let ids = args.strips.find(&operator)?;
+    let call = msg::ReviewStripsRequest { ids: ids.clone(), action, actor: actor.clone(), reason: reason.clone() };
     let answer = operator.desk(&graph::REVIEW_STRIPS)?.call_once(Default::default(), call)?;
     check(answer.reason_code, &answer.reason)?;
     let done = match action {
@@ -154,11 +153,11 @@ pub fn review(args: &DecideArgs, action: u8) -> Result<()> {
         msg::ReviewStripsRequest::ACTION_RELEASE => "released",
         _ => "rejected",
     };
-    tell(args, done, &answer.results)
+    tell(args, &ids, done, &answer.results)
 }
 
-fn tell(args: &DecideArgs, done: &str, results: &[msg::SubmitResult]) -> Result<()> {
-    for (id, result) in args.ids.iter().zip(results) {
+fn tell(args: &DecideArgs, ids: &[u64], done: &str, results: &[msg::SubmitResult]) -> Result<()> {
+    for (id, result) in ids.iter().zip(results) {
         print_result(&format!("strip {id}"), done, result, args.json)?;
     }
     match results.iter().filter(|result| !result.accepted).count() {
@@ -172,15 +171,15 @@ fn tell(args: &DecideArgs, done: &str, results: &[msg::SubmitResult]) -> Result<
 /// # Errors
 /// When the file does not hold one strip, nobody answers, or the new strip is refused.
 pub fn replace(args: &ReplaceArgs) -> Result<()> {
-    let import = read_files(std::slice::from_ref(&args.file), lengths(SimConfig::default().requests.length_max_km)?)?;
-    let [named] = &import.requests[..] else {
-        bail!("{} holds {} strips: one is needed to replace one", args.file.display(), import.requests.len());
-    };
-    let request = msg::StripRequest { submitter: args.submitter.clone(), ..request_message(named) };
     let operator = Operator::start()?;
+    let import = read_files(std::slice::from_ref(&args.file), &args.cutting.of_mission(&operator)?)?;
+    let [order] = &import.orders[..] else {
+        bail!("{} holds {} strips: one is needed to replace one", args.file.display(), import.orders.len());
+    };
+    let request = msg::StripRequest { submitter: args.submitter.clone(), ..request_message(order) };
     let call = msg::ReplaceStripRequest { id: args.id, request };
     let result = operator.desk(&graph::REPLACE_STRIP)?.call(call)?.result;
-    print_result(&named.name, "accepted", &result, args.json)?;
+    print_result(&order.name, "accepted", &result, args.json)?;
     if !result.accepted {
         bail!("strip {} was not replaced", args.id);
     }

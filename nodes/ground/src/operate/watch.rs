@@ -1,12 +1,13 @@
 //! `swath strips watch`: requests as they change.
 
 use std::collections::VecDeque;
-use std::io::{IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
+use swath_node::out;
 use swath_ros::{Shutdown, graph};
 
 use super::client::Operator;
@@ -46,8 +47,9 @@ pub fn watch(args: &WatchArgs) -> Result<()> {
         while let Some(event) = events.take()? {
             seen += 1;
             news = true;
-            if !live {
-                print_event(&event, args.json)?;
+            let line = || if args.json { status_json(&event).to_string() } else { event_line(&event) };
+            if !live && !out::print_line(line())? {
+                return Ok(());
             }
             view.last.push_front(event);
             view.last.truncate(SHOWN);
@@ -64,9 +66,7 @@ pub fn watch(args: &WatchArgs) -> Result<()> {
             news = true;
         }
         if live && news {
-            let mut stdout = std::io::stdout().lock();
-            write!(stdout, "\x1b[H\x1b[2J{}", view.text())?;
-            stdout.flush()?;
+            out::print(&format!("\x1b[H\x1b[2J{}", view.text()))?;
             // A person reads a few pictures a second.
             std::thread::sleep(REFRESH);
         } else {
@@ -74,13 +74,6 @@ pub fn watch(args: &WatchArgs) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn print_event(event: &msg::StripStatus, json: bool) -> Result<()> {
-    let line = if json { status_json(event).to_string() } else { event_line(event) };
-    let mut stdout = std::io::stdout().lock();
-    writeln!(stdout, "{line}")?;
-    Ok(stdout.flush()?)
 }
 
 fn event_line(event: &msg::StripStatus) -> String {

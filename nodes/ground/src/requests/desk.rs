@@ -29,6 +29,7 @@ pub(super) struct Desk {
     list: Server<msg::ListStrips>,
     history: Server<msg::ListHistory>,
     preview: Server<msg::PreviewStrip>,
+    limits: Server<msg::GetLimits>,
     /// Submissions that are being taken, a slice at a time.
     jobs: VecDeque<Job>,
 }
@@ -51,6 +52,7 @@ impl Desk {
             list: node.server(&graph::LIST_STRIPS)?,
             history: node.server(&graph::LIST_HISTORY)?,
             preview: node.server(&graph::PREVIEW_STRIP)?,
+            limits: node.server(&graph::GET_LIMITS)?,
             jobs: VecDeque::new(),
         })
     }
@@ -108,6 +110,9 @@ impl Desk {
         }
         while let Some((id, call)) = next(&self.preview)? {
             self.preview.respond(id, preview(logic, base, &call))?;
+        }
+        while let Some((id, _)) = next(&self.limits)? {
+            self.limits.respond(id, messages::limits(&base.mission.cutting()))?;
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Messages about strip requests: values that come in are checked by the request manager, each with its reason.
 
 use swath_mission::orders::action::Review;
+use swath_mission::orders::cutting::Cutting;
 use swath_mission::orders::order::Order;
 use swath_mission::requests::index::Area;
 use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome};
@@ -227,6 +228,17 @@ pub fn request_summary(stamper: &Stamper, logic: &RequestLogic) -> msg::RequestS
         superseded: count(State::Superseded),
         fulfilled_by_link: count(State::FulfilledByLink),
         reward: logic.reward(),
+    }
+}
+
+/// What strips may be.
+#[must_use]
+pub fn limits(cutting: &Cutting) -> msg::GetLimitsResponse {
+    msg::GetLimitsResponse {
+        length_min_km: cutting.shortest_km,
+        length_max_km: cutting.longest_km,
+        swath_km: cutting.swath_km,
+        earth_radius: cutting.radius_m,
     }
 }
 

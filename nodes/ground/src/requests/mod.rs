@@ -2,6 +2,7 @@
 
 mod desk;
 pub mod json;
+mod lock;
 pub mod messages;
 mod outgoing;
 mod rows;

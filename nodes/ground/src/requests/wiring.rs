@@ -13,6 +13,7 @@ use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use super::desk::Desk;
+use super::lock::StoreLock;
 use super::messages;
 use super::outgoing::Outgoing;
 use super::store::{Durability, Store};
@@ -22,18 +23,30 @@ use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
 use swath_node::node::{MissionNode, Severity};
 use swath_node::orders::{operator_action, order_of};
+use swath_node::program::{Parameter, Program};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
 /// Requests of long calls that are taken before the mission is looked at again.
 const SLICE: usize = 100;
 
+const STORE: Parameter =
+    Parameter { name: "store", about: "Path of the store (SQLite); empty for one that does not last." };
+
+/// The node as a program.
+const PROGRAM: Program = Program {
+    node: graph::REQUEST_MANAGER,
+    name: "swath-requests",
+    about: "The request manager: takes requests, offers them to the planner, keeps what became of them",
+    parameters: &[STORE],
+};
+
 /// Runs the request manager until it is asked to end.
 ///
 /// # Errors
 /// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = RequestNode::new(MissionNode::start(graph::REQUEST_MANAGER)?)?;
+    let mut node = RequestNode::new(MissionNode::start(&PROGRAM)?)?;
     let outcome = node.fly();
     let RequestNode { mut writer, reader, .. } = node;
     // The last connection to close the store leaves one file.
@@ -67,13 +80,15 @@ struct RequestNode {
     writer: Writer,
     reader: Store,
     base: MissionNode,
+    /// Nobody else writes the store.
+    _lock: StoreLock,
     /// Removed when the node ends.
     _temporary: Option<tempfile::TempDir>,
 }
 
 impl RequestNode {
     fn new(base: MissionNode) -> Result<Self> {
-        let spec = Spec::new("store", String::new(), "Path of the store (SQLite); empty for one that does not last.");
+        let spec = Spec::new(STORE.name, String::new(), STORE.about);
         let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
         base.node.parameters().check_given()?;
         let (path, temporary) = if path.as_os_str().is_empty() {
@@ -83,6 +98,7 @@ impl RequestNode {
         } else {
             (path, None)
         };
+        let lock = StoreLock::take(&path)?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let logic = take_up(&base, &mut store)?;
@@ -107,6 +123,7 @@ impl RequestNode {
             reader,
             logic,
             base,
+            _lock: lock,
             _temporary: temporary,
         })
     }
@@ -283,7 +300,8 @@ fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
         tracing::info!("{count} requests are taken up from {}, at {at}", store.path().display());
         return Ok(logic);
     }
-    let requests = base.mission.initial_requests()?;
+    let (requests, faults) = base.mission.initial_requests()?;
+    faults.iter().for_each(|fault| tracing::warn!("{fault}"));
     let total = requests.len();
     let accepted = requests.into_iter().filter_map(|order| logic.submit(order, Tick(0)).ok()).count();
     tracing::info!("{accepted} of the {total} strips known from the start are accepted");

@@ -1,5 +1,9 @@
 //! What is asked for: orders, the files that they come in, and what else operators ask.
 
 pub mod action;
+pub mod cutting;
+pub mod feature;
+pub mod formats;
 pub mod geojson;
+pub mod import;
 pub mod order;

@@ -252,6 +252,7 @@ impl GuidanceLogic {
             body: state.body,
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
+            resources: None,
         };
         if !over {
             self.waiting.push_back(state);

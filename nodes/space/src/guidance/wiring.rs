@@ -16,6 +16,7 @@ use super::logic::{Command, Effect, GuidanceLogic};
 use super::messages;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::node::{MissionNode, Severity};
+use swath_node::program::{PACE, Program};
 
 /// How long a question without an answer waits before it is asked again.
 const ASK_AGAIN_AFTER: Duration = Duration::from_millis(500);
@@ -24,12 +25,20 @@ const PACED_SHARE: f64 = 0.8;
 /// Simulated time between two status messages [s].
 const STATUS_PERIOD_S: f64 = 10.0;
 
+/// The node as a program.
+const PROGRAM: Program = Program {
+    node: graph::GUIDANCE,
+    name: "swath-guidance",
+    about: "Guidance and attitude control: flies the tasks of the planner",
+    parameters: &[PACE],
+};
+
 /// Runs the guidance node until it is asked to end.
 ///
 /// # Errors
 /// When the node cannot come up or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = GuidanceNode::new(MissionNode::start(graph::GUIDANCE)?)?;
+    let mut node = GuidanceNode::new(MissionNode::start(&PROGRAM)?)?;
     while !node.base.shutdown.asked() {
         node.turn()?;
     }
@@ -67,7 +76,7 @@ struct Question {
 impl GuidanceNode {
     fn new(base: MissionNode) -> Result<Self> {
         let mission = &base.mission;
-        let pace = Spec::new("pace", mission.pace, "0: lockstep; 1: real time; x: x times real time.");
+        let pace = Spec::new(PACE.name, mission.pace, PACE.about);
         let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
         base.node.parameters().check_given()?;
         let period = base.model.period;

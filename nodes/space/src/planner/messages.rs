@@ -93,7 +93,7 @@ pub fn planner_status(stamper: &Stamper, now: Tick, logic: &PlannerLogic, strip:
 pub fn decision(stamper: &Stamper, planned: &Planned, upcoming: &Upcoming, compute_time_s: f64) -> msg::Decision {
     let (chosen, t_pre_ticks) = match planned.decision {
         Decision::Image { candidate, t_pre } => (candidate as u32, t_pre),
-        Decision::Wait { .. } => (upcoming.candidates.len() as u32, 0),
+        Decision::Wait { .. } | Decision::Serve { .. } => (upcoming.candidates.len() as u32, 0),
     };
     let mut rationale = planned.rationale.clone().unwrap_or_default();
     rationale.probabilities.truncate(upcoming.candidates.len());

@@ -16,6 +16,18 @@ use super::messages;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_node::node::{MissionNode, Severity};
+use swath_node::program::{Parameter, Program};
+
+const PLANNER_PARAMETER: Parameter =
+    Parameter { name: "planner", about: "The planner, as mission files name them; the mission's without it." };
+
+/// The node as a program.
+const PROGRAM: Program = Program {
+    node: graph::PLANNER,
+    name: "swath-planner",
+    about: "The planner: chooses the next strip and how long to turn to it",
+    parameters: &[PLANNER_PARAMETER],
+};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
@@ -25,7 +37,7 @@ const IDLE: Duration = Duration::from_millis(500);
 /// # Errors
 /// When the node cannot come up or DDS fails.
 pub fn run(policies: &Policies) -> Result<()> {
-    let mut node = PlannerNode::new(MissionNode::start(graph::PLANNER)?, policies)?;
+    let mut node = PlannerNode::new(MissionNode::start(&PROGRAM)?, policies)?;
     while !node.base.shutdown.asked() {
         node.turn()?;
     }
@@ -53,7 +65,7 @@ struct PlannerNode {
 
 impl PlannerNode {
     fn new(base: MissionNode, policies: &Policies) -> Result<Self> {
-        let name = Spec::new("planner", base.mission.planner.to_string(), "As the mission file names planners.");
+        let name = Spec::new(PLANNER_PARAMETER.name, base.mission.planner.to_string(), PLANNER_PARAMETER.about);
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);

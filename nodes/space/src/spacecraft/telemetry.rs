@@ -10,8 +10,13 @@ use swath_sim::world::frames::latitude_longitude_deg;
 
 use swath_node::messages::vector3;
 use swath_node::node::MissionNode;
+use swath_node::program::Parameter;
 use swath_node::stamp::{BODY_FRAME, EARTH_FRAME, INERTIAL_FRAME};
 use swath_sim::vehicle::spacecraft::StateSample;
+
+/// How often.
+pub const PERIOD: Parameter =
+    Parameter { name: "telemetry_period_s", about: "Simulated time between frames, wheels and ground track [s]." };
 
 /// Writers of standard messages, once in a while.
 pub struct Telemetry {
@@ -27,7 +32,7 @@ impl Telemetry {
     /// # Errors
     /// When the parameter is out of range or DDS fails.
     pub fn new(base: &MissionNode) -> Result<Self> {
-        let period = Spec::new("telemetry_period_s", 10.0, "Simulated time between frames, wheels and ground track.");
+        let period = Spec::new(PERIOD.name, 10.0, PERIOD.about);
         let period = base.node.parameters().declare(period.in_range(0.1..=3600.0).read_only())?;
         Ok(Self {
             frames: base.node.publisher(&graph::TF)?,

@@ -11,9 +11,10 @@ use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 
 use super::logic::SpacecraftLogic;
-use super::telemetry::Telemetry;
+use super::telemetry::{self, Telemetry};
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::node::{MissionNode, Severity};
+use swath_node::program::{PACE, Parameter, Program};
 use swath_sim::vehicle::spacecraft::StateSample;
 
 /// In lockstep, states without an answer for so long are sent again.
@@ -25,12 +26,24 @@ const COMMAND_PATIENCE: Duration = PACED_PATIENCE.saturating_mul(2);
 /// States that may be without an answer: two ticks are under way at once.
 const IN_FLIGHT: usize = 2;
 
+const WAIT_FOR: Parameter =
+    Parameter { name: "wait_for", about: "Nodes that must be there before time begins, by commas." };
+const PEER_TIMEOUT: Parameter = Parameter { name: "peer_timeout_s", about: "How long to wait for them [s]." };
+
+/// The node as a program.
+const PROGRAM: Program = Program {
+    node: graph::SPACECRAFT,
+    name: "swath-spacecraft",
+    about: "The satellite: orbit, attitude, wheels, and the mission's time",
+    parameters: &[PACE, WAIT_FOR, PEER_TIMEOUT, telemetry::PERIOD],
+};
+
 /// Runs the spacecraft node until it is asked to end.
 ///
 /// # Errors
 /// When the node cannot come up, a peer is missing, or DDS fails.
 pub fn run() -> Result<()> {
-    let base = MissionNode::start(graph::SPACECRAFT)?;
+    let base = MissionNode::start(&PROGRAM)?;
     let mut spacecraft = SpacecraftNode::new(base)?;
     spacecraft.wait_for_peers()?;
     spacecraft.fly()?;
@@ -55,13 +68,14 @@ struct SpacecraftNode {
 impl SpacecraftNode {
     fn new(base: MissionNode) -> Result<Self> {
         let parameters = base.node.parameters();
-        let pace = Spec::new("pace", base.mission.pace, "0: lockstep; 1: real time; x: x times real time.");
+        let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
         let pace = parameters.declare(pace.in_range(0.0..=1e6).read_only())?;
         let peers = "guidance,request_manager,planner".to_owned();
-        let peers = Spec::new("wait_for", peers, "Nodes that must be there before time begins, by commas.");
+        let peers = Spec::new(WAIT_FOR.name, peers, WAIT_FOR.about);
         let peers = parameters.declare(peers.read_only())?.split(',').map(str::to_owned).collect();
-        let timeout = Spec::new("peer_timeout_s", 20.0, "How long to wait for them.");
+        let timeout = Spec::new(PEER_TIMEOUT.name, 20.0, PEER_TIMEOUT.about);
         let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
+        let telemetry = Telemetry::new(&base)?;
         parameters.check_given()?;
         Ok(Self {
             logic: SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon),
@@ -72,7 +86,7 @@ impl SpacecraftNode {
                 false => None,
             },
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
-            telemetry: Telemetry::new(&base)?,
+            telemetry,
             unanswered: VecDeque::new(),
             pace,
             peers,

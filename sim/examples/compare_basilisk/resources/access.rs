@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use serde::Deserialize;
+use swath_sim::config::station::Station;
 use swath_sim::time::Tick;
 use swath_sim::world::contacts::{View, contacts_of};
-use swath_sim::world::stations::Station;
 
 use super::read::Input;
 use super::{Check, Comparison};

@@ -100,6 +100,11 @@ pub fn is_on(on: &Option<Vec<[f64; 2]>>, time_s: f64) -> bool {
     on.as_ref().is_none_or(|on| on.iter().any(|[from, to]| *from <= time_s && time_s < *to))
 }
 
+/// What the loads that are switched on take [W].
+fn loads_w(sinks: &[Sink], time_s: f64) -> f64 {
+    sinks.iter().filter(|sink| is_on(&sink.on, time_s)).map(|sink| sink.watts).sum()
+}
+
 /// Panel, wheels and switched loads on a battery.
 pub fn battery(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> {
     let mut flown = ClosedLoop::new(meta)?;
@@ -122,9 +127,9 @@ pub fn battery(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> {
         Check::new("ticks full", 0.0),
         Check::new("ticks empty", 0.0),
     ];
-    let (count, dt): (u64, f64) = (meta.get("ticks")?, flown.model.period.seconds());
+    let dt = flown.model.period.seconds();
     let (mut full, mut empty, mut row) = (0.0, 0.0, 0);
-    for tick in 0..count {
+    for tick in 0..meta.get::<u64>("ticks")? {
         if tick > 0 {
             flown.advance();
         }
@@ -135,8 +140,7 @@ pub fn battery(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> {
         for power in drawn(&wheels, flown.body.wheel_speed.as_slice(), flown.torque.as_slice()) {
             if power > 0.0 { flows.0 += power } else { flows.1 -= power }
         }
-        let time_s = tick as f64 * dt;
-        flows.1 += sinks.iter().filter(|sink| is_on(&sink.on, time_s)).map(|sink| sink.watts).sum::<f64>();
+        flows.1 += loads_w(&sinks, tick as f64 * dt);
         if tick > 0 {
             battery.flow(flows.0 * dt, flows.1 * dt);
         }

@@ -93,7 +93,7 @@ impl Experience {
     pub fn remember(&mut self, context: &DecisionContext<'_>, decision: Decision) {
         let (strip, t_pre) = match decision {
             Decision::Image { candidate, t_pre } => (context.candidates.get(candidate).map(|it| it.id), t_pre),
-            Decision::Wait { .. } => (None, 0),
+            Decision::Wait { .. } | Decision::Serve { .. } => (None, 0),
         };
         self.decided = Some(Decided { task: context.task, now: context.situation.now, strip, t_pre });
     }

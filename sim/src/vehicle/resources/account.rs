@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
+use crate::config::resources::{Antenna, Desaturation, ResourcesConfig};
 use crate::model::Model;
 use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
 use crate::vehicle::mrp::Rotation;
-use crate::vehicle::resources::battery::{Battery, J_PER_WH, SolarArray, WheelPower};
-use crate::vehicle::resources::config::{Antenna, Desaturation, ResourcesConfig};
+use crate::vehicle::resources::battery::{Battery, SolarArray, WheelPower};
 use crate::vehicle::resources::momentum::{External, Rods, Thrusters};
 use crate::vehicle::resources::storage::{ImageFile, Storage};
 use crate::world::contacts::{ContactPlan, View};
@@ -70,11 +70,13 @@ pub struct ResourceState {
     pub storage_bits: u64,
     /// Whether a station heard the satellite at the last tick.
     pub in_contact: bool,
+    /// The time in contact with any station that is under way or comes next: its first tick, and the first one after it.
+    pub contact: Option<(Tick, Tick)>,
     /// Bits sent over the last tick.
     pub sent_bits: u64,
     /// Dipole of the rods over the last tick, in B [A m²].
     pub rod_dipole_B: Vector3<f64>,
-    /// What failed first, and when.
+    /// What failed last, and when.
     pub failure: Option<(Tick, Failure)>,
 }
 
@@ -110,8 +112,6 @@ pub struct Onboard {
     bits_a_tick: (u64, u64),
     contacts: ContactPlan,
     views: Vec<View>,
-    /// The time in contact that is under way or comes next.
-    contact: Option<(Tick, Tick)>,
     battery: Battery,
     storage: Storage,
     delivered: Vec<ImageFile>,
@@ -132,7 +132,7 @@ impl Onboard {
         let earth_radius = model.config.earth.radius_m;
         let stations = model.stations.clone();
         let dt = model.period.seconds();
-        let capacity_j = config.battery_capacity_wh * J_PER_WH;
+        let capacity_j = config.battery_capacity_j();
         let battery = Battery::new(capacity_j, config.battery_initial * capacity_j);
         let mu = model.config.earth.mu_m3_s2;
         let by = |wanted| config.desaturation == wanted;
@@ -163,14 +163,13 @@ impl Onboard {
             bits_a_tick: (bits(config.imager_rate_bps, dt), bits(config.transmitter_rate_bps, dt)),
             views: stations.iter().map(|it| View::new(it, &model.config, model.period)).collect(),
             contacts: ContactPlan::new(stations, &model.config, orbit, model.period),
-            contact: None,
             storage: Storage::new(config.storage_capacity_bits),
             delivered: Vec::new(),
             state: ResourceState::at_epoch(&battery, config.storage_capacity_bits),
             battery,
             config: config.clone(),
         };
-        onboard.contact = onboard.contacts.around(Tick(0)).next(Tick(0));
+        onboard.state.contact = onboard.contacts.around(Tick(0)).next(Tick(0));
         Some(onboard)
     }
 
@@ -222,23 +221,20 @@ impl Onboard {
             self.storage.record(strip, self.bits_a_tick.0);
         }
         self.transmit(now, r_BN_N, body, activity);
-        self.power(r_BN_N, body, torque, activity);
+        let met = self.power(r_BN_N, body, torque, activity);
         self.state.stored_bits = self.storage.stored();
         self.state.to_send_bits = self.storage.to_send();
         self.state.charge_j = self.battery.charge_j();
         if body.wheel_speed.amax() * plant.wheel_inertia > self.config.wheel_momentum_max_nms {
-            self.state.failure.get_or_insert((now, Failure::WheelMomentum));
+            self.state.failure = Some((now, Failure::WheelMomentum));
         }
-        if !self.met() {
-            self.state.failure.get_or_insert((now, Failure::BatteryEmpty));
+        if !met {
+            self.state.failure = Some((now, Failure::BatteryEmpty));
         }
     }
 
-    fn met(&self) -> bool {
-        self.battery.books().unmet_nj == 0
-    }
-
-    fn power(&mut self, r_BN_N: &Vector3<f64>, body: &BodyState, torque: &Vector3<f64>, activity: Activity) {
+    /// Says whether the battery had what was asked for.
+    fn power(&mut self, r_BN_N: &Vector3<f64>, body: &BodyState, torque: &Vector3<f64>, activity: Activity) -> bool {
         let config = &self.config;
         self.state.illumination = self.sun.illumination(r_BN_N);
         let mut generated_w = 0.0;
@@ -266,15 +262,15 @@ impl Onboard {
         if activity.desaturate.is_some() && self.thrusters.is_some() {
             asked_w += config.thruster_w;
         }
-        self.battery.flow(generated_w * self.dt, asked_w * self.dt);
         (self.state.generated_w, self.state.asked_w) = (generated_w, asked_w);
+        self.battery.flow(generated_w * self.dt, asked_w * self.dt)
     }
 
     fn transmit(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState, activity: Activity) {
-        if self.contact.is_some_and(|(_, set)| set <= now) {
-            self.contact = self.contacts.around(now).next(now);
+        if self.state.contact.is_some_and(|(_, set)| set <= now) {
+            self.state.contact = self.contacts.around(now).next(now);
         }
-        self.state.in_contact = self.contact.is_some_and(|(rise, _)| rise <= now);
+        self.state.in_contact = self.state.contact.is_some_and(|(rise, _)| rise <= now);
         self.state.sent_bits = 0;
         if !self.state.in_contact || self.storage.to_send() == 0 || !self.heard(now, r_BN_N, body, activity) {
             return;
@@ -326,6 +322,12 @@ impl Onboard {
         &self.config
     }
 
+    /// Whether momentum is taken out by thrusters, which takes a task.
+    #[must_use]
+    pub fn has_thrusters(&self) -> bool {
+        self.config.has_thrusters()
+    }
+
     /// The battery.
     #[must_use]
     pub fn battery(&self) -> &Battery {
@@ -356,6 +358,7 @@ impl ResourceState {
             to_send_bits: 0,
             storage_bits,
             in_contact: false,
+            contact: None,
             sent_bits: 0,
             rod_dipole_B: Vector3::zeros(),
             failure: None,

@@ -6,8 +6,6 @@ use crate::world::sun::{ASTRONOMICAL_UNIT, SOLAR_FLUX};
 
 /// Nanojoules in a joule.
 pub const NJ_PER_J: f64 = 1e9;
-/// Joules in a watt hour.
-pub const J_PER_WH: f64 = 3600.0;
 
 /// A flat solar array, fixed to the body.
 #[derive(Clone, Debug)]

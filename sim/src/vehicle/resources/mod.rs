@@ -2,7 +2,6 @@
 
 mod account;
 pub mod battery;
-pub mod config;
 pub mod momentum;
 pub mod storage;
 

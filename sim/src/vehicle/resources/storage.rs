@@ -1,6 +1,6 @@
 //! On-board storage: files of images in whole bits, and which of them is sent next.
 
-use crate::vehicle::resources::config::DownlinkOrder;
+use crate::config::resources::DownlinkOrder;
 use crate::world::strip::StripId;
 
 /// An image on its way to the ground.

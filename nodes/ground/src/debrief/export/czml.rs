@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use swath_mission::time_text::date;
 use swath_msgs::swath_msgs as msg;
 
-use super::Track;
+use super::track::Track;
 use crate::debrief::places::strip_places;
 use crate::debrief::recorded::Recorded;
 

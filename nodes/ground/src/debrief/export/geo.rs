@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use serde_json::{Value, json};
 use swath_msgs::swath_msgs as msg;
 
-use super::Track;
+use super::track::Track;
 use crate::debrief::places::{Place, cut_at_antimeridian, strip_places};
 use crate::debrief::recorded::Recorded;
 use crate::requests::json::status_json;
@@ -21,7 +21,7 @@ pub fn write_strips(recorded: &Recorded, folder: &Path) -> Result<()> {
 /// The points below the satellite.
 pub fn write_ground_track(track: &Track, name: &str, folder: &Path) -> Result<()> {
     let places: Vec<Place> = track.points.iter().map(|point| point.place).collect();
-    let ends = |point: Option<&super::TrackPoint>| point.map(|point| point.time_s);
+    let ends = |point: Option<&super::track::TrackPoint>| point.map(|point| point.time_s);
     let properties = json!({ "name": name, "start_s": ends(track.points.first()), "end_s": ends(track.points.last()) });
     write(folder, "ground_track.geojson", vec![feature(&places, properties)])
 }

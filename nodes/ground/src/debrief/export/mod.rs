@@ -4,6 +4,7 @@ mod czml;
 pub mod geo;
 pub mod table;
 mod tables;
+pub mod track;
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,12 +12,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use nalgebra::{UnitQuaternion, Vector3};
-use swath_msgs::swath_msgs as msg;
-use swath_node::messages::state_sample;
 
-use super::places::{Place, attitude_E, position_E, sub_satellite};
-use super::recorded::{NAMESPACE, Recorded};
+use super::recorded::RecordedArgs;
+use track::Track;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -26,8 +24,8 @@ use super::recorded::{NAMESPACE, Recorded};
 Writes tasks, states and decisions as .csv and .parquet, strips.geojson and ground_track.geojson, and
 mission.czml with orbit and attitude for Cesium.")]
 pub struct ExportArgs {
-    /// Bag directory or .mcap file of a mission
-    bag: PathBuf,
+    #[command(flatten)]
+    recorded: RecordedArgs,
     /// Folder for the files; it is made if it is not there
     #[arg(short, long)]
     output: PathBuf,
@@ -37,9 +35,6 @@ pub struct ExportArgs {
     /// Time between points of ground track, orbit and attitude [s]
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = step)]
     step: f64,
-    /// Namespace of the mission's nodes
-    #[arg(long, default_value = NAMESPACE)]
-    namespace: String,
 }
 
 /// A kind of file.
@@ -55,31 +50,13 @@ pub enum Format {
     Czml,
 }
 
-/// The satellite's way over the ground.
-pub struct Track {
-    /// Points in order of time.
-    pub points: Vec<TrackPoint>,
-}
-
-/// A point of the satellite's way.
-pub struct TrackPoint {
-    /// Time since the mission's epoch [s].
-    pub time_s: f64,
-    /// The point below the satellite.
-    pub place: Place,
-    /// The satellite in the planet-fixed frame [m].
-    pub r_E: Vector3<f64>,
-    /// The rotation that takes body components to planet-fixed ones; neighbours have like signs.
-    pub attitude_E: UnitQuaternion<f64>,
-}
-
 impl ExportArgs {
     /// Writes the files.
     ///
     /// # Errors
     /// When the bag holds no mission or a file cannot be written.
     pub fn run(self) -> Result<ExitCode> {
-        let recorded = Recorded::open(&self.bag, &self.namespace)?;
+        let recorded = self.recorded.open()?;
         let folder = &self.output;
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let wanted = |format| self.format.is_empty() || self.format.contains(&format);
@@ -100,46 +77,6 @@ impl ExportArgs {
             }
         }
         Ok(ExitCode::SUCCESS)
-    }
-}
-
-impl Track {
-    /// A point every `step_s` of simulated time, and the last one.
-    ///
-    /// # Errors
-    /// When the bag has no states or they cannot be read.
-    pub fn read(recorded: &Recorded, step_s: f64) -> Result<Self> {
-        let period = recorded.model.period;
-        let every = u64::from(period.ticks_ceil(step_s).max(1));
-        let mut earth = recorded.model.earth.clone();
-        let mut points: Vec<TrackPoint> = Vec::new();
-        let mut last = None;
-        let mut add = |state: &msg::SpacecraftState| -> Result<()> {
-            let sample = state_sample(state)?;
-            let mut attitude = attitude_E(&mut earth, &sample);
-            // A quaternion and its negative are one attitude; interpolation wants the nearer one.
-            if points.last().is_some_and(|before| before.attitude_E.dot(&attitude) < 0.0) {
-                attitude = UnitQuaternion::new_unchecked(-attitude.into_inner());
-            }
-            points.push(TrackPoint {
-                time_s: period.time_s(sample.tick),
-                place: sub_satellite(&mut earth, &sample),
-                r_E: position_E(&mut earth, &sample),
-                attitude_E: attitude,
-            });
-            Ok(())
-        };
-        recorded.for_each_state(|state| {
-            if state.tick.is_multiple_of(every) {
-                add(&state)?;
-            }
-            last = Some(state);
-            Ok(())
-        })?;
-        if let Some(last) = last.filter(|last: &msg::SpacecraftState| !last.tick.is_multiple_of(every)) {
-            add(&last)?;
-        }
-        Ok(Self { points })
     }
 }
 

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::recorded::{NAMESPACE, Recorded};
+use super::recorded::RecordedArgs;
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -21,14 +21,11 @@ use super::recorded::{NAMESPACE, Recorded};
 The page holds the ground track and the strips on a map, the tasks over time, attitude error, wheel speeds and
 torques, reward, request states, and each decision with its candidates.")]
 pub struct ReportArgs {
-    /// Bag directory or .mcap file of a mission
-    bag: PathBuf,
+    #[command(flatten)]
+    recorded: RecordedArgs,
     /// The page
     #[arg(short, long, default_value = "report.html")]
     output: PathBuf,
-    /// Namespace of the mission's nodes
-    #[arg(long, default_value = NAMESPACE)]
-    namespace: String,
 }
 
 impl ReportArgs {
@@ -37,7 +34,7 @@ impl ReportArgs {
     /// # Errors
     /// When the bag holds no mission or the page cannot be written.
     pub fn run(self) -> Result<ExitCode> {
-        let recorded = Recorded::open(&self.bag, &self.namespace)?;
+        let recorded = self.recorded.open()?;
         let page = page::page(&recorded, &story::Story::of(&recorded)?)?;
         fs::write(&self.output, page).with_context(|| format!("cannot write {}", self.output.display()))?;
         Ok(ExitCode::SUCCESS)

@@ -5,7 +5,7 @@ use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
 use swath_sim::config::RAD_S_PER_RPM;
 
-use crate::debrief::export::Track;
+use crate::debrief::export::track::Track;
 use crate::debrief::places::{Place, strip_places};
 use crate::debrief::recorded::Recorded;
 use crate::requests::json::state_name;

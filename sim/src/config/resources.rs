@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::in_range;
+use crate::config::range::in_range;
+use crate::config::station::Station;
 use crate::error::SimError;
-use crate::world::stations::Station;
 
 /// Where settings that are left out come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -163,10 +163,14 @@ settings! {
     disturbance_nm: [f64; 3],
     /// Which reward counts.
     reward: RewardKind,
+    /// Whether a shield keeps every planner from what the battery does not last for.
+    shield: bool,
     /// What an episode loses when the battery is empty or a wheel fails.
     failure_penalty: f64,
 }
 
+/// Joules in a watt hour.
+const J_PER_WH: f64 = 3600.0;
 /// The camera's boresight in B is +z.
 const CAMERA_B: [f64; 3] = [0.0, 0.0, 1.0];
 /// The stations of BSK-RL.
@@ -225,6 +229,7 @@ impl ResourcesConfig {
             residual_dipole_am2: [0.0, 1.0, 0.0],
             disturbance_nm: [0.0, 2e-5, 0.0],
             reward: RewardKind::Delivered,
+            shield: true,
             failure_penalty: 1.0,
         }
     }
@@ -253,6 +258,24 @@ impl ResourcesConfig {
             disturbance_nm: [1e-4, 1e-4, 1e-4],
             ..Self::minisat()
         }
+    }
+
+    /// Capacity of the battery [J].
+    #[must_use]
+    pub fn battery_capacity_j(&self) -> f64 {
+        self.battery_capacity_wh * J_PER_WH
+    }
+
+    /// Whether data come down in downlink tasks alone.
+    #[must_use]
+    pub fn antenna_needs_task(&self) -> bool {
+        self.antenna == Antenna::BodyFixed
+    }
+
+    /// Whether momentum is taken out by thrusters, which takes a task.
+    #[must_use]
+    pub fn has_thrusters(&self) -> bool {
+        self.desaturation == Desaturation::Thrusters
     }
 
     /// All stations, those of the catalogue first.

@@ -1,0 +1,180 @@
+//! Files of requests on the command line, and how their lines and areas become strips.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Result, ensure};
+use clap::Args;
+use serde_json::{Value, json};
+use swath_msgs::swath_msgs as msg;
+use swath_node::out;
+use swath_ros::graph;
+use swath_sim::config::SimConfig;
+
+use super::client::Operator;
+use swath_mission::orders::cutting::{Cutting, SWATH_KM};
+use swath_mission::orders::import::{Cut, Import, Shown, import, write};
+
+/// How lines and areas become strips.
+#[derive(Debug, Args)]
+pub struct CuttingArgs {
+    /// Longest strip [km]; the mission's limit without this
+    #[arg(long)]
+    max_length_km: Option<f64>,
+    /// Width of what the camera shows [km]; the mission's without this
+    #[arg(long)]
+    swath_km: Option<f64>,
+    /// Greatest distance of a line from its strips [km]; half a swath without this
+    #[arg(long)]
+    tolerance_km: Option<f64>,
+    /// Direction of the strips of areas, clockwise from north [deg]; the one with the fewest strips without this
+    #[arg(long, allow_hyphen_values = true)]
+    heading_deg: Option<f64>,
+    /// Make strips of lines that are shorter than the shortest strip, too
+    #[arg(long)]
+    stretch: bool,
+}
+
+/// How long a dry run waits for a mission to tell its limits.
+const DRY_PATIENCE: Duration = Duration::from_secs(3);
+
+impl CuttingArgs {
+    /// With the limits of the mission that is flying.
+    ///
+    /// # Errors
+    /// When nobody answers or an option is out of range.
+    pub fn of_mission(&self, operator: &Operator) -> Result<Cutting> {
+        let limits = operator.desk(&graph::GET_LIMITS)?.call(msg::GetLimitsRequest::default())?;
+        self.with(&cutting_of(&limits))
+    }
+
+    /// With the limits of the mission that is flying, if one is, else with the usual ones.
+    ///
+    /// # Errors
+    /// When an option is out of range.
+    pub fn of_any(&self) -> Result<Cutting> {
+        let operator = Operator::start()?;
+        let limits = operator.desk_within(&graph::GET_LIMITS, DRY_PATIENCE);
+        match limits.and_then(|desk| desk.call(msg::GetLimitsRequest::default())) {
+            Ok(limits) => self.with(&cutting_of(&limits)),
+            Err(_) => {
+                out::say("no mission is flying in this domain: strips are cut by the usual limits");
+                self.usual()
+            }
+        }
+    }
+
+    /// With the usual limits.
+    ///
+    /// # Errors
+    /// When an option is out of range.
+    pub fn usual(&self) -> Result<Cutting> {
+        self.with(&Cutting::of(&SimConfig::default()))
+    }
+
+    fn with(&self, limits: &Cutting) -> Result<Cutting> {
+        let within = |name: &str, value: Option<f64>, least: f64, greatest: f64| match value {
+            Some(value) if !(least..=greatest).contains(&value) => {
+                anyhow::bail!("--{name} is {value}, outside {least} to {greatest}")
+            }
+            value => Ok(value),
+        };
+        let longest_km = within("max-length-km", self.max_length_km, 1.0, 5000.0)?.unwrap_or(limits.longest_km);
+        let swath_km = within("swath-km", self.swath_km, 0.1, 1000.0)?.unwrap_or(limits.swath_km);
+        let tolerance_km = within("tolerance-km", self.tolerance_km, 0.01, 1000.0)?.unwrap_or(0.5 * swath_km);
+        Ok(Cutting {
+            shortest_km: limits.shortest_km.min(longest_km),
+            longest_km,
+            swath_km,
+            tolerance_km,
+            heading_deg: within("heading-deg", self.heading_deg, -360.0, 360.0)?,
+            stretch: self.stretch,
+            ..*limits
+        })
+    }
+}
+
+fn cutting_of(limits: &msg::GetLimitsResponse) -> Cutting {
+    Cutting {
+        shortest_km: limits.length_min_km,
+        longest_km: limits.length_max_km,
+        swath_km: if limits.swath_km > 0.0 { limits.swath_km } else { SWATH_KM },
+        radius_m: limits.earth_radius,
+        ..Cutting::of(&SimConfig::default())
+    }
+}
+
+/// Reads the strips of files, `-` for standard input; what is no strip is told on stderr.
+///
+/// # Errors
+/// When a file as a whole cannot be read.
+pub fn read_files(files: &[PathBuf], cutting: &Cutting) -> Result<Import> {
+    ensure!(files.iter().filter(|file| file.as_os_str() == "-").count() < 2, "standard input can be read once");
+    let mut all = Import::default();
+    for file in files {
+        let import = import(file, cutting)?;
+        for fault in &import.refused {
+            out::say(printable(&fault.to_string()));
+        }
+        all.shapes += import.shapes;
+        all.orders.extend(import.orders);
+        all.cut.extend(import.cut);
+        all.refused.extend(import.refused);
+    }
+    Ok(all)
+}
+
+/// Writes strips to a file, `-` for standard output.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_file(path: &Path, import: &Import) -> Result<()> {
+    let path = if path.as_os_str() == "-" { Path::new("/dev/stdout") } else { path };
+    Ok(write(path, &import.orders)?)
+}
+
+/// What became of lines and areas, for people.
+#[must_use]
+pub fn cut_text(cut: &[Cut]) -> String {
+    let mut text = String::new();
+    for Cut { name, strips, shown } in cut {
+        let name = printable(name);
+        let strips = if *strips == 1 { "1 strip".to_owned() } else { format!("{strips} strips") };
+        _ = match shown {
+            Shown::Line { length_km, farthest_km } => writeln!(
+                text,
+                "cut       {name}: a line of {length_km:.0} km, {strips}, at most {farthest_km:.1} km from it"
+            ),
+            Shown::Area { square_km, covered, twice } => writeln!(
+                text,
+                "cut       {name}: an area of {square_km:.0} km², {strips}, {:.1} % shown, {:.1} % twice",
+                100.0 * covered,
+                100.0 * twice
+            ),
+        };
+    }
+    text
+}
+
+/// What became of lines and areas, for machines.
+#[must_use]
+pub fn cut_json(cut: &[Cut]) -> Value {
+    let one = |Cut { name, strips, shown }: &Cut| match shown {
+        Shown::Line { length_km, farthest_km } => {
+            json!({ "line": name, "strips": strips, "length_km": length_km, "farthest_km": farthest_km })
+        }
+        Shown::Area { square_km, covered, twice } => {
+            json!({ "area": name, "strips": strips, "square_km": square_km, "covered": covered, "twice": twice })
+        }
+    };
+    cut.iter().map(one).collect()
+}
+
+/// A text of someone else's without what would steer the terminal.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    let escaped =
+        |letter: char| if letter.is_control() { letter.escape_default().to_string() } else { letter.to_string() };
+    text.chars().map(escaped).collect()
+}

@@ -1,0 +1,266 @@
+//! Files of requests as people bring them: what is read, what is refused and how it is told.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::io::Cursor;
+use std::path::Path;
+
+use rand::{RngExt as _, SeedableRng as _};
+use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::formats;
+use swath_mission::orders::import::{Import, Shown, import_features};
+use swath_mission::orders::order::Order;
+use swath_sim::config::SimConfig;
+
+const KML: &str = r#"<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document><Folder><Placemark id="k">
+    <name>x</name><ExtendedData><Data name="priority"><value>0.7</value></Data></ExtendedData>
+    <LineString><coordinates>10,45,0 12,46,0</coordinates></LineString></Placemark></Folder></Document></kml>"#;
+const GPX: &str = r#"<?xml version="1.0"?><gpx version="1.1" creator="c"><trk><name>x</name><trkseg>
+    <trkpt lat="45" lon="10"/><trkpt lat="46" lon="12"/></trkseg></trk></gpx>"#;
+const GEOJSON: &str = r#"{"type":"Feature","properties":{"name":"x"},
+    "geometry":{"type":"LineString","coordinates":[[10,45],[12,46]]}}"#;
+const CSV: &str = "name,start_lat,start_lon,end_lat,end_lon\nx,45,10,46,12\n";
+
+fn try_read(name: &str, bytes: &[u8]) -> Result<Import, String> {
+    let features = formats::read(bytes, Path::new(name)).map_err(|error| error.to_string())?;
+    Ok(import_features(features, Path::new(name), &Cutting::of(&SimConfig::default())))
+}
+
+fn read(name: &str, text: &str) -> Import {
+    try_read(name, text.as_bytes()).unwrap()
+}
+
+/// Orders of a text in which nothing is refused.
+fn orders(name: &str, text: &str) -> Vec<Order> {
+    let import = read(name, text);
+    assert_eq!(import.refused, []);
+    import.orders
+}
+
+fn faults(name: &str, text: &str) -> Vec<String> {
+    read(name, text).refused.iter().map(ToString::to_string).collect()
+}
+
+fn collection(features: &str) -> String {
+    format!(r#"{{"type":"FeatureCollection","features":[{features}]}}"#)
+}
+
+fn shapefile() -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    let line = shapefile::Polyline::new(vec![shapefile::Point::new(10.0, 45.0), shapefile::Point::new(12.0, 46.0)]);
+    shapefile::ShapeWriter::new(&mut bytes).write_shapes(&[line]).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn the_same_line_in_every_format_is_the_same_strip() {
+    let [expected] = &orders("a.geojson", GEOJSON)[..] else { panic!("one strip") };
+    let texts = [
+        ("b.geojsons", format!("\u{1e}{}\n", GEOJSON.replace('\n', " "))),
+        ("bom.geojson", format!("\u{feff}{GEOJSON}")),
+        ("d.kml", KML.to_owned()),
+        ("e.gpx", GPX.to_owned()),
+        ("f.wkt", "LINESTRING(10 45, 12 46)\n".to_owned()),
+        ("g.wkt", "SRID=4326;MULTILINESTRING Z ((10 45 0, 12 46 0))".to_owned()),
+        ("h.csv", CSV.to_owned()),
+        ("i.csv", "name;WKT\nx;\"LINESTRING (10 45, 12 46)\"\n".to_owned()),
+        ("-", collection(GEOJSON)),
+    ];
+    for (name, text) in texts {
+        let [order] = &orders(name, &text)[..] else { panic!("{name}: one strip") };
+        let place = |order: &Order| {
+            let it = &order.request;
+            [it.start_longitude_deg, it.start_latitude_deg, it.end_longitude_deg, it.end_latitude_deg]
+        };
+        assert_eq!(place(order), place(expected), "{name}");
+    }
+    let import = try_read("lines.shp", &shapefile()).unwrap();
+    assert_eq!((import.orders[0].request.clone(), import.refused.len()), (expected.request.clone(), 0));
+    let kml = &orders("d.kml", KML)[0];
+    assert_eq!((kml.request.priority, kml.client_ref.as_str(), kml.name.as_str()), (0.7, "k", "x"));
+}
+
+#[test]
+fn sequences_and_lines_of_geojson_are_many_features() {
+    let one = GEOJSON.replace('\n', " ");
+    assert_eq!(orders("a.geojsonl", &format!("{one}\n{}\n", one.replace("12,46", "13,46"))).len(), 2);
+    assert_eq!(orders("a.geojsons", &format!("\u{1e}{one}\n\u{1e}{}", one.replace("12,46", "13,46"))).len(), 2);
+}
+
+#[test]
+fn a_collection_of_geometries_is_one_feature_of_several_parts() {
+    let text = r#"{"type":"Feature","properties":{"name":"n","client_ref":"r"},"geometry":{"type":"GeometryCollection",
+        "geometries":[{"type":"LineString","coordinates":[[10,45],[12,46]]},{"type":"Point","coordinates":[1,2]},
+        {"type":"MultiLineString","coordinates":[[[20,45],[22,46]]]}]}}"#;
+    let import = read("c.geojson", text);
+    let names: Vec<_> = import.orders.iter().map(|order| (order.name.as_str(), order.client_ref.as_str())).collect();
+    assert_eq!(names, [("n 1", "r 1"), ("n 3", "r 3")]);
+    assert_eq!(
+        import.refused[0].to_string(),
+        "requests c.geojson, feature 1, part 2: a Point is no strip: expected a line or an area"
+    );
+}
+
+#[test]
+fn what_is_null_is_unset_and_numbers_are_names() {
+    let text = r#"{"type":"Feature","id":17,"properties":{"NAME":42,"priority":null,"bidirectional":null,
+        "max_attempts":null},"geometry":{"type":"LineString","coordinates":[[10,45],[12,46]]}}"#;
+    let [order] = &orders("a.geojson", text)[..] else { panic!("one strip") };
+    assert_eq!((order.name.as_str(), order.client_ref.as_str()), ("42", "17"));
+    assert_eq!((order.request.priority, order.request.bidirectional, order.max_attempts), (0.5, false, 0));
+}
+
+#[test]
+fn other_reference_systems_are_refused_by_name() {
+    let with = |name: &str| {
+        let crs = format!(r#""crs":{{"type":"name","properties":{{"name":"{name}"}}}},"features""#);
+        try_read("a.geojson", collection(GEOJSON).replace(r#""features""#, &crs).as_bytes())
+    };
+    let error = with("urn:ogc:def:crs:EPSG::3857").unwrap_err();
+    assert_eq!(error, "is in urn:ogc:def:crs:EPSG::3857: convert it with `ogr2ogr -t_srs EPSG:4326 OUT.geojson IN`");
+    assert_eq!(with("urn:ogc:def:crs:OGC:1.3:CRS84").unwrap().orders.len(), 1);
+    assert_eq!(with("EPSG:4326").unwrap().orders.len(), 1);
+    let error = try_read("a.wkt", b"SRID=32632;LINESTRING(10 45, 12 46)").unwrap_err();
+    assert!(error.contains("SRID=32632"), "{error}");
+}
+
+#[test]
+fn formats_that_are_not_read_are_named_with_what_converts_them() {
+    for (begin, format) in [
+        (&b"SQLite format 3\0"[..], "a GeoPackage or another SQLite file"),
+        (b"fgb\x03fgb\0", "FlatGeobuf"),
+        (b"PK\x03\x04", "a ZIP archive, such as KMZ"),
+        (b"<gml:FeatureCollection xmlns:gml=\"http://www.opengis.net/gml\"/>", "GML"),
+    ] {
+        let error = try_read("a.bin", begin).unwrap_err();
+        assert!(error.contains(format) && error.contains("ogr2ogr"), "{error}");
+    }
+    assert!(try_read("a.txt", b"once upon a time").unwrap_err().contains("of no format that is known"));
+    assert!(try_read("a.geojson", b"once upon a time").unwrap_err().contains("is not GeoJSON"));
+    assert!(try_read("a.kml", b"<kml><Document>").unwrap_err().contains("is not KML"));
+    assert!(try_read("a.csv", b"name,where\nx,there\n").unwrap_err().contains("it needs a column `wkt`"));
+}
+
+#[test]
+fn one_bad_part_costs_itself_and_all_faults_are_told() {
+    let features = [
+        GEOJSON,
+        r#"{"type":"Feature","properties":{},"geometry":{"type":"LineString","coordinates":[[1,2],["three",4]]}}"#,
+        r#"{"type":"Feature","properties":{"priority":"high"},"geometry":{"type":"LineString","coordinates":[[1,2],[3,4]]}}"#,
+        r#"{"type":"Feature","properties":{},"geometry":{"type":"MultiLineString","coordinates":[[[1,2]],[[1,2],[3,4]]]}}"#,
+        r#"{"type":"Feature","properties":{},"geometry":null}"#,
+        r#"{"type":"Feature","properties":{},"geometry":{"type":"Polygon","coordinates":[[[1,95],[2,2],[3,4],[1,95]]]}}"#,
+    ];
+    let text = collection(&features.join(","));
+    assert_eq!(read("f.geojson", &text).orders.len(), 2);
+    let faults = faults("f.geojson", &text);
+    assert_eq!(faults.len(), 5, "{faults:?}");
+    for (fault, expected) in faults.iter().zip([
+        "feature 2:",
+        "feature 3: `priority` must be a number",
+        "feature 4, part 1: a line needs two points",
+        "feature 5: it has no geometry",
+        "feature 6: 1, 95 is no longitude and latitude",
+    ]) {
+        assert!(fault.contains(expected), "{fault} lacks {expected}");
+    }
+}
+
+#[test]
+fn whole_circles_work_and_antipodal_neighbours_are_refused_alone() {
+    let line = |coordinates: &str| format!(r#"{{"type":"LineString","coordinates":{coordinates}}}"#);
+    let equator = orders("equator.geojson", &line("[[-180,0],[0,0],[180,0]]"));
+    assert_eq!(equator.len(), 81);
+    for (one, next) in equator.iter().zip(&equator[1..]) {
+        let turned = (next.request.start_longitude_deg - one.request.end_longitude_deg).rem_euclid(360.0);
+        assert!(turned.min(360.0 - turned) < 1e-9, "{turned}");
+        let ahead = (one.request.end_longitude_deg - one.request.start_longitude_deg).rem_euclid(360.0);
+        assert!(ahead < 4.6, "eastward: {ahead}");
+    }
+    let parallel = orders("parallel.geojson", &line("[[-180,60],[-90,60],[0,60],[90,60],[180,60]]"));
+    assert!(parallel.iter().all(|order| (order.request.end_latitude_deg - 60.0).abs() < 0.06));
+    assert_eq!(orders("meridian.geojson", &line("[[10,-90],[10,90]]")).len(), 41);
+    let import = read("antipodal3.geojson", &line("[[0,0],[180,0],[180,10]]"));
+    assert_eq!(import.orders.len(), 3);
+    assert!(import.refused[0].reason.contains("antipodal"), "{:?}", import.refused);
+    let beyond = &orders("beyond.geojson", &line("[[370,0],[372,0]]"))[0].request;
+    assert_eq!((beyond.start_longitude_deg, beyond.end_longitude_deg), (10.0, 12.0));
+}
+
+#[test]
+fn an_area_is_one_order_whose_strips_share_its_worth() {
+    let text = r#"{"type":"Feature","properties":{"name":"lake","client_ref":"lake","priority":0.8},"geometry":
+        {"type":"MultiPolygon","coordinates":[[[[0,0],[1,0],[1,1],[0,1],[0,0]],[[0.4,0.4],[0.6,0.4],[0.6,0.6],[0.4,0.6],[0.4,0.4]]],
+        [[[2,0],[2.5,0],[2.5,0.5],[2,0]]]]}}"#;
+    let import = read("lake.geojson", text);
+    let [cut] = &import.cut[..] else { panic!("{:?}", import.cut) };
+    let Shown::Area { square_km, covered, twice } = cut.shown else { panic!("{cut:?}") };
+    let degree_km = 111.3_f64;
+    let expected = degree_km * degree_km * (1.0 - 0.04 + 0.125);
+    assert!((square_km / expected - 1.0).abs() < 0.01, "{square_km} {expected}");
+    assert!(covered > 0.99 && twice < 0.15, "{covered} {twice}");
+    let worth: f64 = import.orders.iter().map(|order| order.request.priority).sum();
+    assert!((worth - 0.8 * covered).abs() < 1e-9, "{worth}");
+    let count = import.orders.len();
+    assert_eq!(import.orders[0].client_ref, format!("lake 1/{count}"));
+}
+
+#[test]
+fn identity_does_not_hang_on_position_or_file_name() {
+    let second = GEOJSON.replace("12,46", "13,46");
+    let before: Vec<_> = orders("lines.geojson", &collection(&format!("{GEOJSON},{second}")));
+    let inserted = GEOJSON.replace("12,46", "11,46");
+    let after = orders("other.geojson", &collection(&format!("{inserted},{GEOJSON},{second}")));
+    let references = |orders: &[Order]| orders.iter().map(|order| order.client_ref.clone()).collect::<Vec<_>>();
+    assert_eq!(references(&before), references(&after[1..]));
+    assert_ne!(before[0].client_ref, after[0].client_ref);
+    let other = GEOJSON.replace(r#""name":"x""#, r#""name":"x","priority":0.6"#);
+    assert_ne!(orders("lines.geojson", &other)[0].client_ref, before[0].client_ref, "conditions are part of it");
+}
+
+#[test]
+fn short_lines_are_stretched_if_that_is_wanted() {
+    let text = r#"{"type":"LineString","coordinates":[[10,0],[10.1,0]]}"#;
+    let features = || formats::read(text.as_bytes(), Path::new("short.geojson")).unwrap();
+    let cutting = Cutting::of(&SimConfig::default());
+    let import = import_features(features(), Path::new("short.geojson"), &Cutting { stretch: true, ..cutting });
+    let config = SimConfig::default();
+    import.orders[0].request.to_strip(&config.requests, config.earth.radius_m).unwrap();
+    let as_it_is = import_features(features(), Path::new("short.geojson"), &cutting);
+    assert!(as_it_is.orders[0].request.to_strip(&config.requests, config.earth.radius_m).is_err());
+}
+
+#[test]
+fn damaged_files_of_every_format_are_refused_or_read_and_nothing_panics() {
+    let area = r#"{"type":"Polygon","coordinates":[[[0,0],[1,0],[1,1],[0,0]]]}"#;
+    let seeds: [(&str, Vec<u8>); 8] = [
+        ("a.geojson", GEOJSON.into()),
+        ("a.geojson", area.into()),
+        ("a.kml", KML.into()),
+        ("a.gpx", GPX.into()),
+        ("a.wkt", b"POLYGON((0 0, 1 0, 1 1, 0 0))".into()),
+        ("a.csv", CSV.into()),
+        ("a.csv", b"name,wkt\nx,\"LINESTRING(10 45, 12 46)\"\n".into()),
+        ("a.shp", shapefile()),
+    ];
+    let mut rng = rand::rngs::StdRng::seed_from_u64(5);
+    let mut read = 0;
+    for (name, seed) in &seeds {
+        for _ in 0..200 {
+            let mut bytes = seed.clone();
+            for _ in 0..rng.random_range(1..4) {
+                let at = rng.random_range(0..bytes.len());
+                match rng.random_range(0..4) {
+                    0 => bytes[at] = rng.random_range(0..=255),
+                    1 => bytes.truncate(at + 1),
+                    2 => bytes.insert(at, b"0123456789-.e,[]{}<>\"\n "[rng.random_range(0..23)]),
+                    _ => drop(bytes.remove(at)),
+                }
+                if bytes.is_empty() {
+                    bytes.push(b'{');
+                }
+            }
+            read += usize::from(try_read(name, &bytes).is_ok());
+        }
+    }
+    assert!(read > 100, "only {read} were still read");
+}
