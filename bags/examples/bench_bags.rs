@@ -116,13 +116,14 @@ fn measure_cyclone(dir: &Path) -> Value {
     let play = |rate: &str| {
         let reader = peer("read");
         let played = last_line(this(&["play", bag.to_str().unwrap(), rate]));
-        last_line(reader);
-        played
+        let taken = last_line(reader)["taken"].as_u64().unwrap();
+        (played, RECORDED.saturating_sub(taken))
     };
-    let (steady, fast) = (play("1"), play("0"));
+    let ((steady, steady_lost), (fast, fast_lost)) = (play("1"), play("0"));
     json!({
         "record_bursts_lost": RECORDED - recorded["messages"].as_u64().unwrap(),
         "play_cyclone_late_p99_ms": steady["late_p99_ms"],
+        "play_cyclone_lost": steady_lost + fast_lost,
         "play_cyclone_refused": RECORDED - steady["published"].as_u64().unwrap(),
         "play_cyclone_msgs_per_s": (RECORDED as f64 / fast["seconds"].as_f64().unwrap()).round(),
     })
@@ -300,6 +301,7 @@ fn play(bag: &Path, rate: f64) -> Value {
         qos_overrides: BTreeMap::new(),
         keys: false,
         acknowledged: Some(LAST_MESSAGES),
+        force: false,
     };
     let player = Player::start(options, &RosArgs::default()).unwrap();
     let summary = player.run(&Shutdown::default(), |_| ()).unwrap();

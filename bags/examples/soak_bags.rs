@@ -1,4 +1,5 @@
-//! Reads damaged bags for as long as it takes: `soak_bags [FIRST_SEED [COUNT]]`; prints one JSON object.
+//! Reads damaged bags for as long as it takes: `cargo xtask soak bags [SEEDS]`, or `soak_bags FIRST_SEED COUNT` for some of
+//! them; prints one JSON object.
 //!
 //! Each bag follows from its seed, so that a run may be cut into ranges and a failure tried again by itself. Every
 //! hundredth is recovered and filtered, too. A bag that takes longer than [`PATIENCE`] ends the run.
@@ -29,9 +30,16 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const SAVED: u64 = 100;
 
 fn main() {
-    let args: Vec<u64> = env::args().skip(1).map(|arg| arg.parse().unwrap()).collect();
-    let first = args.first().copied().unwrap_or(0);
-    let count = args.get(1).copied().unwrap_or(100_000);
+    let args: Vec<String> = env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let (first, count): (u64, u64) = match args[..] {
+        ["--plan"] => {
+            println!("{}", json!({ "seeds": 10_000_000, "chunk": 100_000 }));
+            return;
+        }
+        [first, count] => (first.parse().unwrap(), count.parse().unwrap()),
+        _ => panic!("usage: soak_bags --plan | FIRST_SEED COUNT"),
+    };
     let samples = mutate::samples(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data"));
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap();
@@ -54,11 +62,10 @@ fn main() {
         }
     }
     let result = json!({
-        "first_seed": first,
         "bags": count,
         "opened": opened,
         "panics": panics,
-        "memory_MB": memory_mb(),
+        "max_memory_MB": memory_mb(),
         "seconds": start.elapsed().as_secs_f64().round(),
     });
     println!("{result}");

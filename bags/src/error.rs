@@ -126,6 +126,18 @@ pub enum BagError {
     /// ROS or DDS refused something.
     #[error(transparent)]
     Ros(Box<swath_ros::RosError>),
+    /// A bag would be played into a mission that flies.
+    #[error(
+        "{node} flies in domain {domain}, and {topic} is one of its mission's topics (--force plays it all the same)"
+    )]
+    LiveMission {
+        /// The node of the mission.
+        node: String,
+        /// The DDS domain.
+        domain: u16,
+        /// A topic that would be played.
+        topic: String,
+    },
     /// An option or argument is out of its range or contradicts another.
     #[error("{option}: {reason}")]
     Option {

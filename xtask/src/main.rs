@@ -1,5 +1,6 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|soak|web`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|soak|ament|web`.
 
+mod ament;
 mod bench;
 mod examples;
 mod libtorch;
@@ -11,6 +12,7 @@ mod venv;
 mod web;
 
 use std::ffi::OsString;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -36,6 +38,8 @@ usage: cargo xtask COMMAND
                    stopped goes on; without a name, list them
   web              test and build the console's page with npm, from its sources into
                    the files that the program holds
+  ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
+                   in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
 ";
 
 fn main() -> ExitCode {
@@ -62,6 +66,7 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("bench") => bench(&root, rest),
         Some("soak") => soak(&root, rest),
         Some("web") => web(&root, rest),
+        Some("ament") => ament(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
             Ok(())
@@ -136,6 +141,20 @@ fn web(root: &Path, args: &[OsString]) -> Result<()> {
         bail!("web takes no arguments\n\n{USAGE}");
     }
     web::build(root)
+}
+
+fn ament(root: &Path, args: &[OsString]) -> Result<()> {
+    let prefix = match args {
+        [] => root.join("target/ament"),
+        [folder] => std::path::absolute(folder).with_context(|| format!("there is no {}", folder.display()))?,
+        _ => bail!("ament takes one folder\n\n{USAGE}"),
+    };
+    setup(root, false)?;
+    let packages = ["--package", "swath-nodes", "--package", "swath-bags", "--bins"];
+    process::run(process::cargo(root, "build").arg("--release").args(packages))?;
+    ament::lay_out(root, &root.join("target/release"), &prefix)?;
+    let line = format!("export AMENT_PREFIX_PATH={}:$AMENT_PREFIX_PATH", prefix.display());
+    writeln!(std::io::stdout(), "{line}").context("cannot say where ROS finds the programs")
 }
 
 fn repository_root() -> Result<PathBuf> {

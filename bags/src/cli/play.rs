@@ -88,6 +88,9 @@ pub struct PlayArgs {
     /// Leave the terminal's keys alone
     #[arg(long)]
     disable_keyboard_controls: bool,
+    /// Play into a mission that flies in this domain
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     read: ReadArgs,
 }
@@ -132,6 +135,7 @@ impl PlayArgs {
             remap: self.remap.into_iter().collect(),
             qos_overrides: overrides(self.qos_profile_overrides_path.as_deref())?,
             keys: !self.disable_keyboard_controls,
+            force: self.force,
             acknowledged: match self.wait_for_all_acked {
                 None => Some(LAST_MESSAGES),
                 Some(0) => None,

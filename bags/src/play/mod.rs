@@ -73,6 +73,8 @@ pub struct PlayOptions {
     pub keys: bool,
     /// How long readers may take to acknowledge the last messages; without end when there is none [wall time].
     pub acknowledged: Option<Duration>,
+    /// Whether a mission that flies in the domain is no reason not to play.
+    pub force: bool,
 }
 
 /// Where playing ends; at the bag's end where nothing else is said.
@@ -145,6 +147,7 @@ impl Player {
         let bag = Bag::open_all(&self.options.bags, self.options.read)?;
         let (from, filter) = self.span(&bag)?;
         let outlets = self.outlets(&bag)?;
+        self.spare_missions(&outlets)?;
         let count = outlets.publishers.len();
         let clock = self.clock()?;
         let control = Control::new(&self.node)?;
@@ -173,6 +176,30 @@ impl Player {
             late_p99: engine.lateness.quantile(0.99),
             faults,
         })
+    }
+
+    /// Keeps messages off the topics of a mission that flies. Its nodes would not take them for their own, but
+    /// everybody else would.
+    fn spare_missions(&self, outlets: &Outlets) -> Result<()> {
+        if self.options.force {
+            return Ok(());
+        }
+        for node in self.node.nodes() {
+            let Some((namespace, name)) = node.rsplit_once('/').filter(|(_, name)| graph::FLIGHT_NODES.contains(name))
+            else {
+                continue;
+            };
+            let is_its_own = |topic: &str| topic == CLOCK || topic.starts_with(&format!("{namespace}/"));
+            if let Some(topic) = outlets.publishers.iter().map(RawPublisher::topic).find(|topic| is_its_own(topic)) {
+                let domain = self.node.environment().domain;
+                return Err(BagError::LiveMission {
+                    node: format!("{namespace}/{name}"),
+                    domain,
+                    topic: topic.to_owned(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Waits until reliable readers have everything, but not long once the end is asked for.

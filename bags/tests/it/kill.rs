@@ -85,7 +85,7 @@ fn assert_lost_within_a_second(killed: &Path, saved: &Path, killed_at: u64) {
 }
 
 #[test]
-#[ignore = "takes minutes: cargo test --release -p swath-bags --test kill -- --ignored --nocapture"]
+#[ignore = "takes minutes: cargo test --release -p swath-bags --test it kill -- --ignored --nocapture"]
 fn a_killed_recorder_loses_no_more_than_the_last_second() {
     const DOMAIN: u16 = 48;
     let temp = tempfile::tempdir().unwrap();

@@ -17,7 +17,7 @@ use swath_msgs::{
     swath_msgs::SpacecraftState,
 };
 use swath_ros::{
-    Node, RawSample, RawSubscription, Subscription, graph,
+    Environment, Mapping, Node, RawSample, RawSubscription, RosArgs, Subscription, graph,
     qos::{Durability, History, QosProfile},
 };
 
@@ -384,4 +384,22 @@ fn what_cannot_be_played_is_told() {
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert!(stderr.ends_with(reason), "{stderr}");
     }
+}
+
+/// The nodes of a mission do not count what a player says; their guests would.
+#[test]
+fn a_mission_that_flies_is_spared() {
+    let temp = folder();
+    let environment = Environment { domain: 58, localhost_only: false, mapping: Mapping::Cyclone };
+    let words = ["--ros-args", "-r", "__ns:=/swath", "-p", "memory_limit_mb:=0"].map(str::to_owned);
+    let spacecraft = Node::start_in(environment, graph::SPACECRAFT, &RosArgs::split(words).unwrap().1).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_swath-bag"));
+    let output = command.args(["play", "bag", "--delay", "0"]).current_dir(temp.path()).env("ROS_DOMAIN_ID", "58");
+    let output = output.stdin(Stdio::null()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("/swath/spacecraft flies in domain 58") && text.contains("--force"), "{text}");
+    let forced = player(58, temp.path(), &["--rate", "0", "--force"]);
+    assert!(forced.end().0.success());
+    drop(spacecraft);
 }

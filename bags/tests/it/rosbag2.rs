@@ -37,7 +37,7 @@ fn compare(original: &Path, made: &Path) -> Value {
 }
 
 #[test]
-#[ignore = "needs a clone of ros2/rosbag2: SWATH_ROSBAG2=DIR cargo test --release -p swath-bags --test rosbag2 -- --ignored --nocapture"]
+#[ignore = "needs a clone of ros2/rosbag2: SWATH_ROSBAG2=DIR cargo test --release -p swath-bags --test it rosbag2 -- --ignored --nocapture"]
 fn every_test_bag_of_rosbag2_is_read_filtered_and_read_again_by_others() {
     let clone = PathBuf::from(env::var_os("SWATH_ROSBAG2").expect("SWATH_ROSBAG2 names the clone"));
     let temp = tempfile::tempdir().unwrap();

@@ -83,8 +83,9 @@ pub struct Mission {
     pub pace: f64,
     /// Simulated time of the mission's epoch [s since 1970-01-01 UTC].
     pub epoch_unix_s: u32,
-    /// Planner: `beam`, `beam:WIDTHxDEPTH`, `lookahead`, `lookahead:TICKS` of margin, `heuristic:SECONDS`, `random`, or
-    /// a kind of policy, such as `hop-ppo` for the shipped one and `hop-ppo:FILE` for another; see [`PlannerSpec`].
+    /// Planner: `beam`, `beam:WIDTHxDEPTH`, `repair`, `aspen`, `lookahead`, `lookahead:TICKS` of margin,
+    /// `heuristic:SECONDS`, `random`, or a kind of policy, such as `hop-ppo` for the shipped one and `hop-ppo:FILE` for
+    /// another; see [`PlannerSpec`].
     pub planner: PlannerSpec,
     /// Strips known from the start, and what holds for all.
     pub requests: MissionRequests,

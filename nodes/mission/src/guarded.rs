@@ -26,11 +26,12 @@ const FALLBACK: Heuristic = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
 /// Who made the decisions of a mission: their numbers by name of the planner.
 pub type Deciders = BTreeMap<String, u64>;
 
-/// How many decisions the heuristic made in the place of the planner that was asked for.
+/// The decisions that the heuristic made in the place of the planner that was asked for.
 #[must_use]
-pub fn made_instead(deciders: &Deciders, asked_for: &PlannerSpec) -> u64 {
+pub fn made_instead(mut deciders: Deciders, asked_for: &PlannerSpec) -> Deciders {
     let name = FALLBACK.name();
-    if asked_for.to_string() == name { 0 } else { deciders.get(&name).copied().unwrap_or(0) }
+    deciders.retain(|decider, _| *decider == name && asked_for.to_string() != name);
+    deciders
 }
 
 /// A planner with the heuristic behind it, which decides when the planner cannot.

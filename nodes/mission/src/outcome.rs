@@ -72,9 +72,9 @@ pub struct NodeProcess {
 pub struct Summary {
     /// Name of the planner that was asked for.
     pub planner: String,
-    /// Decisions by the name of the planner that made them.
-    #[serde(default)]
-    pub deciders: Deciders,
+    /// Decisions that another made in its place, by that one's name; absent if there are none.
+    #[serde(default, skip_serializing_if = "Deciders::is_empty")]
+    pub decided_instead: Deciders,
     /// Why the mission was not flown to its end; absent if it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
@@ -133,8 +133,8 @@ pub struct ResourcesSummary {
 pub struct SummaryInputs {
     /// Name of the planner that was asked for.
     pub planner: String,
-    /// Decisions by the name of the planner that made them.
-    pub deciders: Deciders,
+    /// Decisions that another made in its place, by that one's name.
+    pub decided_instead: Deciders,
     /// Why the mission was not flown to its end.
     pub failure: Option<String>,
     /// Seed of the mission.
@@ -166,7 +166,7 @@ impl Summary {
         let sim_seconds = seconds(inputs.ticks);
         Self {
             planner: inputs.planner,
-            deciders: inputs.deciders,
+            decided_instead: inputs.decided_instead,
             failure: inputs.failure,
             seed: inputs.seed,
             orbits: inputs.orbits,
@@ -193,8 +193,7 @@ impl Summary {
     #[must_use]
     pub fn table(&self) -> String {
         let mean = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} s"));
-        let others: Vec<_> = self.deciders.iter().filter(|(name, _)| **name != self.planner).collect();
-        let others = others.iter().map(|(name, count)| format!(", {count} decisions by {name}"));
+        let others = self.decided_instead.iter().map(|(name, count)| format!(", {count} decisions by {name}"));
         let mut rows = vec![
             ("planner", self.planner.clone() + &others.collect::<String>()),
             ("seed", self.seed.to_string()),

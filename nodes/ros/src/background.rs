@@ -8,16 +8,18 @@ use std::task::{Context, Poll};
 use std::thread::JoinHandle;
 
 use futures_core::Stream as _;
+use ros2_client::Gid;
 use rustdds::{DomainParticipantStatusListener, RTPSEntity as _, StatusEvented as _};
 
 use crate::dds::Dds;
-use crate::endpoint::{Gid, RawSample, RawSubscription};
+use crate::endpoint::{RawSample, RawSubscription};
 use crate::error::RosError;
 use crate::health::{ASK_EVERY, Ailment, Health};
 use crate::members::Identity;
 use crate::message::decode_as;
 use crate::minder::Minder;
 use crate::param_services::ParameterServices;
+use crate::replies::AllReplies;
 use crate::roster::Roster;
 use crate::signal::{Signal, lock};
 
@@ -54,6 +56,7 @@ struct Shared {
     dds: Arc<Dds>,
     roster: Arc<Roster>,
     minder: Arc<Minder>,
+    replies: AllReplies,
     services: Mutex<Option<ParameterServices>>,
 }
 
@@ -64,6 +67,7 @@ impl Background {
         dds: Arc<Dds>,
         roster: Arc<Roster>,
         minder: Arc<Minder>,
+        replies: AllReplies,
         node_signal: Signal,
     ) -> Result<Self, RosError> {
         let signal = Signal::new();
@@ -77,6 +81,7 @@ impl Background {
             dds,
             roster,
             minder,
+            replies,
             services: Mutex::new(None),
         });
         let running = Arc::clone(&shared);
@@ -117,7 +122,7 @@ impl Shared {
         let mut health = Health::new();
         while !self.stop.load(Ordering::Relaxed) {
             self.take_events(&hearing.listener);
-            self.roster.release_replies();
+            self.replies.release();
             let before = self.roster.revision();
             self.take_all(&hearing.announcements, |sample| self.roster.note_nodes(&sample.cdr));
             self.take_all(&hearing.identities, |sample| self.note_identity(sample));

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use ros2_client::Gid;
 use rustdds::dds::{ReadError, WriteError};
 use rustdds::no_key::DeserializedCacheChange;
-use rustdds::{GUID, SampleIdentity, Timestamp, WriteOptionsBuilder};
+use rustdds::{SampleIdentity, Timestamp, WriteOptionsBuilder};
 
 use crate::cdr::Cdr;
 use crate::error::RosError;
@@ -16,23 +17,6 @@ use crate::roster::{Direction, Roster};
 use crate::rtps::Prefix;
 use crate::signal::{Signal, lock};
 use crate::slot::{Bell, ReaderSlot, WriterSlot};
-
-/// Identity of a writer or reader: 12 bytes of its process, 4 of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Gid(pub [u8; 16]);
-
-impl Gid {
-    /// The half that all endpoints of a process have in common.
-    pub(crate) fn prefix(self) -> Prefix {
-        std::array::from_fn(|index| self.0[index])
-    }
-}
-
-impl From<GUID> for Gid {
-    fn from(guid: GUID) -> Self {
-        Self(guid.to_bytes())
-    }
-}
 
 /// What comes with a sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,11 +93,6 @@ impl RawPublisher {
     /// Whether a reader of that process hears this writer.
     pub(crate) fn is_heard_by(&self, process: Prefix) -> bool {
         self.roster.is_matched_with(self.gid(), process)
-    }
-
-    /// What this process knows of the others.
-    pub(crate) fn roster(&self) -> &Arc<Roster> {
-        &self.roster
     }
 
     /// Readers that this writer sends to.
@@ -289,7 +268,7 @@ mod tests {
         let info = |writer: u8, sequence_number| SampleInfo {
             source_time_ns: None,
             received_time_ns: 0,
-            writer: Gid([writer; 16]),
+            writer: [writer; 16].into(),
             sequence_number,
             related: None,
         };

@@ -3,7 +3,25 @@
 use std::net::{IpAddr, Ipv4Addr};
 
 use crate::error::RosError;
-use crate::service::Mapping;
+
+/// How requests and responses of services are told apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mapping {
+    /// As rmw_cyclonedds does it.
+    Cyclone,
+    /// As rmw_fastrtps and rmw_connextdds do it.
+    Enhanced,
+}
+
+impl Mapping {
+    /// The mapping that the nodes around use, by the value of `RMW_IMPLEMENTATION`.
+    pub fn for_middleware(rmw_implementation: Option<&str>) -> Self {
+        match rmw_implementation {
+            Some(name) if name.contains("fastrtps") || name.contains("connext") => Self::Enhanced,
+            _ => Self::Cyclone,
+        }
+    }
+}
 
 /// The DDS domain, the networks to use, and how services are mapped.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,7 +29,7 @@ pub struct Environment {
     /// `ROS_DOMAIN_ID`, 0 if unset.
     pub domain: u16,
     /// Whether only this host is talked to: `ROS_LOCALHOST_ONLY=1`, or
-    /// `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`.
+    /// `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST` or a value that ROS does not know.
     pub localhost_only: bool,
     /// By `RMW_IMPLEMENTATION`.
     pub mapping: Mapping,
@@ -51,9 +69,14 @@ impl Environment {
         let local = match range.as_deref() {
             None | Some("SUBNET" | "SYSTEM_DEFAULT") => false,
             Some("LOCALHOST") => true,
-            Some(text) => {
-                let reason = "it is not SUBNET, LOCALHOST or SYSTEM_DEFAULT";
+            Some(text @ "OFF") => {
+                let reason = "a mission's nodes must find each other";
                 return Err(failed("ROS_AUTOMATIC_DISCOVERY_RANGE", text, reason));
+            }
+            // As rcl does; there is no log yet.
+            Some(text) => {
+                eprintln!("ROS_AUTOMATIC_DISCOVERY_RANGE=`{text}` is unknown, only this host is talked to");
+                true
             }
         };
         let mapping = Mapping::for_middleware(set("RMW_IMPLEMENTATION").as_deref());
@@ -85,7 +108,12 @@ mod tests {
     fn variables_are_read_as_ros_reads_them() {
         assert_eq!(read(&[("ROS_DOMAIN_ID", "42")]).unwrap().domain, 42);
         assert!(read(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap().localhost_only);
-        assert!(read(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]).unwrap().localhost_only);
+        for (range, localhost_only) in
+            [("LOCALHOST", true), ("SUBNET", false), ("SYSTEM_DEFAULT", false), ("lan", true)]
+        {
+            let read = read(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", range)]).unwrap();
+            assert_eq!(read.localhost_only, localhost_only, "{range}");
+        }
         let fast = read(&[("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")]).unwrap();
         assert_eq!(fast.mapping, Mapping::Enhanced);
     }
@@ -100,6 +128,19 @@ mod tests {
         ] {
             let error = read(&[(name, value)]).unwrap_err().to_string();
             assert!(error.starts_with(&format!("environment variable {name}=`{value}`")), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_middleware_decides_on_the_mapping() {
+        for (name, mapping) in [
+            (None, Mapping::Cyclone),
+            (Some("rmw_cyclonedds_cpp"), Mapping::Cyclone),
+            (Some("rmw_fastrtps_cpp"), Mapping::Enhanced),
+            (Some("rmw_fastrtps_dynamic_cpp"), Mapping::Enhanced),
+            (Some("rmw_connextdds"), Mapping::Enhanced),
+        ] {
+            assert_eq!(Mapping::for_middleware(name), mapping, "{name:?}");
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::endpoint::Gid;
+use ros2_client::Gid;
+
 use crate::rtps::{Claim, Described};
 
 /// Readers that ask for reliability, by identity.
@@ -62,7 +63,7 @@ impl Guests {
     }
 
     pub(crate) fn lose_process(&mut self, process: &[u8]) {
-        self.readers.retain(|gid, _| !gid.0.starts_with(process));
+        self.readers.retain(|gid, _| !gid.as_bytes().starts_with(process));
     }
 }
 
@@ -71,7 +72,7 @@ mod tests {
     use super::*;
 
     fn described(number: u8) -> Described {
-        Described { gid: Gid([number; 16]), topic: "rt/a".to_owned(), type_name: "T".to_owned() }
+        Described { gid: Gid::from([number; 16]), topic: "rt/a".to_owned(), type_name: "T".to_owned() }
     }
 
     fn claim_of(told: Option<(Described, Claim)>) -> Option<Claim> {

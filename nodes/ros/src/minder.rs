@@ -9,11 +9,13 @@ use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Mutex;
 
+use ros2_client::Gid;
 use rustdds::{DomainParticipant, RTPSEntity as _};
 
-use crate::endpoint::Gid;
 use crate::error::RosError;
-use crate::rtps::{Claim, Datagram, Described, EntityId, Prefix, READERS_WRITER, WRITERS_WRITER, acknowledges};
+use crate::rtps::{
+    Claim, Datagram, Described, EntityId, Prefix, READERS_WRITER, WRITERS_WRITER, acknowledges, prefix_of,
+};
 use crate::signal::lock;
 
 /// The topic of a reader that the minder announces to see whether discovery is at work; nobody writes it.
@@ -92,10 +94,10 @@ impl Minder {
     /// reader of [`PROBE`].
     pub(crate) fn ask(&self) {
         let mut talk = lock(&self.talk);
-        let mut gid = Gid([0; 16]);
-        gid.0[..12].copy_from_slice(&talk.own);
-        gid.0[12..].copy_from_slice(&[0, 0, 1, 4]);
-        let probe = Described { gid, topic: PROBE.to_owned(), type_name: PROBE.to_owned() };
+        let mut gid = [0; 16];
+        gid[..12].copy_from_slice(&talk.own);
+        gid[12..].copy_from_slice(&[0, 0, 1, 4]);
+        let probe = Described { gid: gid.into(), topic: PROBE.to_owned(), type_name: PROBE.to_owned() };
         self.say(&mut talk, &probe, Claim::BestEffort);
     }
 
@@ -123,7 +125,7 @@ impl Minder {
 
 impl Talk {
     fn with(participant: &DomainParticipant) -> Self {
-        let rustdds = Gid::from(participant.guid()).prefix();
+        let rustdds = prefix_of(participant.guid().into());
         // Of the same process, but no identity that RustDDS gives: those are drawn at random.
         let mut own = rustdds;
         own[10] ^= 0xff;

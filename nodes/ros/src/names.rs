@@ -1,12 +1,13 @@
 //! Names of nodes, topics and services: the rules of ROS 2, expansion, remapping, and their DDS form.
 
+use ros2_client::NodeName;
+
 use crate::error::RosError;
 
 /// Name and namespace of a node, with the remapping rules that apply to it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
-    namespace: String,
-    name: String,
+    node: NodeName,
     remaps: Vec<(String, String)>,
 }
 
@@ -19,7 +20,9 @@ impl Names {
             check(&absolute)?;
         }
         check_token(name, name)?;
-        let mut names = Self { namespace: absolute, name: name.to_owned(), remaps: Vec::new() };
+        let node = NodeName::new(&absolute, name)
+            .map_err(|_| RosError::Name { name: name.to_owned(), reason: "it is no name of a node" })?;
+        let mut names = Self { node, remaps: Vec::new() };
         for (from, to) in remaps {
             let pair = (names.expand(from)?, names.expand(to)?);
             names.remaps.push(pair);
@@ -29,17 +32,17 @@ impl Names {
 
     /// The namespace, absolute.
     pub fn namespace(&self) -> &str {
-        &self.namespace
+        self.node.namespace()
     }
 
     /// The name within the namespace.
     pub fn name(&self) -> &str {
-        &self.name
+        self.node.base_name()
     }
 
     /// Namespace and name, such as `/swath/spacecraft`.
     pub fn fully_qualified(&self) -> String {
-        format!("{}/{}", self.namespace.trim_end_matches('/'), self.name)
+        self.node.fully_qualified_name()
     }
 
     /// The name that a topic or service really has, after expansion and remapping.
@@ -58,7 +61,7 @@ impl Names {
         } else if let Some(rest) = name.strip_prefix("~/") {
             format!("{}/{rest}", self.fully_qualified())
         } else {
-            format!("{}/{name}", self.namespace.trim_end_matches('/'))
+            format!("{}/{name}", self.namespace().trim_end_matches('/'))
         };
         check(&absolute)?;
         Ok(absolute)

@@ -4,7 +4,10 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use ros2_client::Gid;
+use ros2_client::builtin_topics::ros_discovery;
 use rustdds::{RTPSEntity as _, Timestamp};
+use swath_msgs::rmw_dds_common::ParticipantEntitiesInfo;
 use swath_msgs::{RosMessage, RosService};
 
 use crate::background::{Background, Fault, Hearing};
@@ -12,7 +15,8 @@ use crate::cli::RosArgs;
 use crate::clock::SimClock;
 use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
-use crate::endpoint::{Gid, RawPublisher, RawSubscription};
+use crate::endpoint::{RawPublisher, RawSubscription};
+use crate::entities::Plan;
 use crate::environment::Environment;
 use crate::error::RosError;
 use crate::graph::{self, Entry};
@@ -26,10 +30,12 @@ use crate::notices::Notice;
 use crate::param_services::ParameterServices;
 use crate::params::{Parameters, Spec};
 use crate::qos::{Profile, QosProfile, with_depth};
+use crate::replies::AllReplies;
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
+use crate::shutdown::signalled;
 use crate::signal::Signal;
-use crate::slot::{Plan, WriterSlot};
+use crate::slot::WriterSlot;
 use crate::topic::{Publisher, Subscription};
 
 /// How long a new node listens for another one of its name before it shows itself.
@@ -37,9 +43,6 @@ const LISTENING: Duration = Duration::from_millis(600);
 
 /// How long after a match the other side may still not send or receive.
 const SETTLING: Duration = Duration::from_millis(300);
-
-const ANNOUNCEMENTS: &str = "ros_discovery_info";
-const ANNOUNCEMENT_TYPE: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
 
 /// Memory of a mission's node [10^6 B]: ten times what one needs.
 const MEMBER_MEMORY_MB: i64 = 1000;
@@ -59,6 +62,7 @@ pub struct Node {
     parameters: Parameters,
     clock: SimClock,
     signal: Signal,
+    replies: AllReplies,
     names: Names,
     environment: Environment,
     dds: Arc<Dds>,
@@ -86,7 +90,7 @@ impl Node {
         let minder = Arc::new(Minder::new(&participant)?);
         let signal = Signal::new();
         let latched = Profile::Latched.qos();
-        let announcer = dds.writer(plan(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE, &latched)?)?;
+        let announcer = dds.writer(plan(ros_discovery::TOPIC_NAME, ParticipantEntitiesInfo::TYPE_NAME, &latched)?)?;
         let own = Gid::from(participant.guid());
         let roster = Roster::new(own, names.clone(), announcer, Arc::clone(&minder), members, is_member);
         let roster = Arc::new(roster);
@@ -96,13 +100,17 @@ impl Node {
         };
         let hearing = Hearing {
             listener: participant.status_listener(),
-            announcements: listen(ANNOUNCEMENTS, ANNOUNCEMENT_TYPE)?,
+            announcements: listen(ros_discovery::TOPIC_NAME, ParticipantEntitiesInfo::TYPE_NAME)?,
             identities: listen(IDENTITIES, IDENTITY_TYPE)?,
         };
         let introduction = dds.writer(plan(IDENTITIES, IDENTITY_TYPE, &latched)?)?;
-        let background = Background::start(hearing, Arc::clone(&dds), Arc::clone(&roster), minder, signal.clone())?;
+        let replies = AllReplies::default();
+        let (shared_dds, shared_roster) = (Arc::clone(&dds), Arc::clone(&roster));
+        let background =
+            Background::start(hearing, shared_dds, shared_roster, minder, replies.clone(), signal.clone())?;
         let clock = SimClock::default();
-        let node = Self { background, introduction, roster, parameters, clock, signal, names, environment, dds };
+        let node =
+            Self { background, introduction, roster, parameters, clock, signal, replies, names, environment, dds };
         node.come_up(args, &identity)?;
         Ok(node)
     }
@@ -121,7 +129,10 @@ impl Node {
         logging::install(logger, args.log_level_of(&self.names), self.clock.clone(), rosout);
         let use_sim_time =
             Spec::new("use_sim_time", true, "Stamps and timers follow simulated time; there is no other here.");
-        self.parameters.declare(use_sim_time.read_only())?;
+        if !self.parameters.declare(use_sim_time.read_only())? {
+            let reason = "the nodes know no time but simulated time".to_owned();
+            return Err(RosError::Parameter { name: "use_sim_time".to_owned(), reason });
+        }
         self.background.serve(self.parameter_services()?);
         Ok(())
     }
@@ -195,7 +206,7 @@ impl Node {
         let qos = Profile::Service.qos();
         let requests = self.reader(name.clone(), &request_topic, S::Request::TYPE_NAME, &qos)?;
         let responses = self.writer(name, &response_topic, S::Response::TYPE_NAME, &qos)?;
-        Ok(Server::new(requests, responses, self.environment.mapping))
+        Ok(Server::new(requests, responses, self.environment.mapping, &self.replies))
     }
 
     /// A client of a service.
@@ -217,6 +228,7 @@ impl Node {
     ) -> Result<RawPublisher, RosError> {
         let writer = self.dds.writer(plan(dds_topic, type_name, qos)?)?;
         self.roster.enrol(Direction::Write, writer.gid());
+        tracing::debug!("writes {topic} ({type_name})");
         Ok(RawPublisher::new(writer, topic, Arc::clone(&self.roster)))
     }
 
@@ -229,6 +241,7 @@ impl Node {
     ) -> Result<RawSubscription, RosError> {
         let reader = self.dds.reader(plan(dds_topic, type_name, qos)?)?;
         self.roster.enrol(Direction::Read, reader.gid());
+        tracing::debug!("reads {topic} ({type_name})");
         Ok(RawSubscription::new(reader, topic, Arc::clone(&self.roster), &self.signal))
     }
 
@@ -264,16 +277,19 @@ impl Node {
 
     /// Waits until each of the nodes (as the table names them, in this namespace) is matched on
     /// every topic that it and this node have in common by the table, in the right direction. The
-    /// recorder has every topic in common with everyone.
+    /// recorder has every topic in common with everyone. A signal that asks the process to end ([`crate::Shutdown`]) ends
+    /// the wait at once, as if they were there.
     ///
     /// # Errors
     /// If that is not so when the time is over; the error names what is missing.
     pub fn wait_for_peers(&self, nodes: &[&str], timeout: Duration) -> Result<(), RosError> {
         let deadline = Instant::now() + timeout;
-        if !self.roster.wait_until(deadline, || self.roster.missing(nodes).is_empty()) {
+        if !self.roster.wait_until(deadline, || signalled() || self.roster.missing(nodes).is_empty()) {
             return Err(RosError::MissingPeers { waited: timeout, missing: self.roster.missing(nodes) });
         }
-        std::thread::sleep(SETTLING);
+        if !signalled() {
+            std::thread::sleep(SETTLING);
+        }
         Ok(())
     }
 

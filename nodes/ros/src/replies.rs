@@ -4,7 +4,7 @@
 //! nobody. Each waits until the server's writer is matched with a reader of the client's process, but not for ever.
 
 use std::collections::VecDeque;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use rustdds::SampleIdentity;
@@ -78,5 +78,25 @@ impl Replies {
 
     fn write(&self, reply: Reply) -> Result<(), RosError> {
         self.writer.send(reply.cdr, reply.related).map(|_| ())
+    }
+}
+
+/// The responses of all servers of a node.
+#[derive(Clone, Default)]
+pub(crate) struct AllReplies(Arc<Mutex<Vec<Weak<Replies>>>>);
+
+impl AllReplies {
+    /// From now on these responses are released when their clients are there.
+    pub(crate) fn add(&self, replies: &Arc<Replies>) {
+        let mut all = lock(&self.0);
+        all.retain(|replies| replies.strong_count() > 0);
+        all.push(Arc::downgrade(replies));
+    }
+
+    /// Sends the responses that need not wait any longer.
+    pub(crate) fn release(&self) {
+        let all: Vec<Arc<Replies>> = lock(&self.0).iter().filter_map(Weak::upgrade).collect();
+        let now = Instant::now();
+        all.iter().for_each(|replies| replies.release(now));
     }
 }

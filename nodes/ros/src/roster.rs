@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use ros2_client::Gid;
 use rustdds::{DomainParticipantStatusEvent, EndpointDescription, Timestamp};
 use swath_msgs::rmw_dds_common::{self, NodeEntitiesInfo, ParticipantEntitiesInfo};
 
 use crate::cdr::Cdr;
-use crate::endpoint::Gid;
 use crate::graph::{self, Entry};
 use crate::guests::Guests;
 use crate::members::{Identity, Members, Standing};
@@ -18,8 +18,7 @@ use crate::minder::{Minder, PROBE};
 use crate::names::Names;
 use crate::notices::{Notices, Trouble};
 use crate::qos::is_reliable;
-use crate::replies::Replies;
-use crate::rtps::{Described, Prefix};
+use crate::rtps::{Described, Prefix, prefix_of};
 use crate::signal::lock;
 use crate::slot::WriterSlot;
 
@@ -47,8 +46,6 @@ pub(crate) struct Roster {
     /// What went wrong with the messages of others.
     pub(crate) notices: Notices,
     state: Mutex<State>,
-    /// Responses that may wait for their clients.
-    replies: Mutex<Vec<Weak<Replies>>>,
     changed: Condvar,
     /// Grows whenever it may have changed who counts.
     revision: AtomicU64,
@@ -95,7 +92,6 @@ impl Roster {
             member,
             notices: Notices::default(),
             state: Mutex::new(State::new(own, members)),
-            replies: Mutex::default(),
             changed: Condvar::new(),
             revision: AtomicU64::new(0),
         }
@@ -180,7 +176,7 @@ impl Roster {
     pub(crate) fn note_nodes(&self, cdr: &Cdr) {
         match decode::<ParticipantEntitiesInfo>(cdr) {
             Ok(info) => {
-                let participant = Gid(info.gid.data);
+                let participant = Gid::from(info.gid.data);
                 let mut state = lock(&self.state);
                 if participant != state.own {
                     self.mind_namesake(&mut state, participant, &info.node_entities_info_seq);
@@ -200,7 +196,7 @@ impl Roster {
             return;
         }
         let Some(announced) = state.announced else { return };
-        let ours = other.0[..2] == state.own.0[..2];
+        let ours = other.as_bytes()[..2] == state.own.as_bytes()[..2];
         if ours && other < state.own && announced.elapsed() < TOGETHER {
             state.yields_to = Some(other);
         } else if !state.nodes.contains_key(&other) {
@@ -215,9 +211,9 @@ impl Roster {
 
     /// Takes in who another process says that it is.
     pub(crate) fn note_identity(&self, sender: Gid, identity: Identity) {
-        let process = sender.prefix();
+        let process = prefix_of(sender);
         let mut state = lock(&self.state);
-        if process == state.own.prefix() {
+        if process == prefix_of(state.own) {
             return;
         }
         state.members.note(process, identity);
@@ -266,7 +262,7 @@ impl Roster {
             return;
         }
         let gid = Gid::from(reader.guid);
-        if !self.member || gid.prefix() == state.own.prefix() {
+        if !self.member || prefix_of(gid) == prefix_of(state.own) {
             return;
         }
         let described = Described { gid, topic: reader.topic_name, type_name: reader.type_name };
@@ -277,7 +273,7 @@ impl Roster {
 
     /// Has our writers wait for this reader, or not.
     fn settle(&self, state: &mut State, reader: Gid) {
-        let member = state.members.name_of(reader.prefix()).is_some();
+        let member = state.members.name_of(prefix_of(reader)).is_some();
         if let Some((described, claim)) = state.guests.settle(reader, member) {
             self.minder.say_of_reader(&described, claim);
         }
@@ -313,9 +309,9 @@ impl Roster {
     /// which that holds.
     pub(crate) fn standing(&self, writer: Gid, writers: &[&str]) -> (Standing, u64) {
         let revision = self.revision();
-        let process = writer.prefix();
+        let process = prefix_of(writer);
         let mut state = lock(&self.state);
-        if !self.member || process == state.own.prefix() {
+        if !self.member || process == prefix_of(state.own) {
             return (Standing::Counts, revision);
         }
         let announced: Vec<String> = state.nodes_of(process).map(fully_qualified).collect();
@@ -345,24 +341,10 @@ impl Roster {
         std::mem::take(&mut lock(&self.state).probed)
     }
 
-    /// From now on these responses are released when their clients are there.
-    pub(crate) fn mind_replies(&self, replies: &Arc<Replies>) {
-        let mut all = lock(&self.replies);
-        all.retain(|replies| replies.strong_count() > 0);
-        all.push(Arc::downgrade(replies));
-    }
-
-    /// Sends the responses that need not wait any longer.
-    pub(crate) fn release_replies(&self) {
-        let all: Vec<Arc<Replies>> = lock(&self.replies).iter().filter_map(Weak::upgrade).collect();
-        let now = Instant::now();
-        all.iter().for_each(|replies| replies.release(now));
-    }
-
     /// Whether this endpoint of ours is matched with one of that process.
     pub(crate) fn is_matched_with(&self, own: Gid, process: Prefix) -> bool {
         let state = lock(&self.state);
-        state.matched.get(&own).into_iter().flatten().any(|gid| gid.prefix() == process)
+        state.matched.get(&own).into_iter().flatten().any(|gid| prefix_of(*gid) == process)
     }
 
     pub(crate) fn matched(&self, own: Gid) -> Vec<Gid> {
@@ -458,7 +440,7 @@ impl State {
 
     /// The nodes of a process in the ROS graph.
     fn nodes_of(&self, process: Prefix) -> impl Iterator<Item = &NodeEntitiesInfo> {
-        self.nodes.iter().filter(move |(gid, _)| gid.prefix() == process).flat_map(|(_, nodes)| nodes)
+        self.nodes.iter().filter(move |(gid, _)| prefix_of(**gid) == process).flat_map(|(_, nodes)| nodes)
     }
 
     fn lose(&mut self, remote: Gid) {
@@ -471,13 +453,13 @@ impl State {
 
     fn lose_participant(&mut self, prefix: &[u8]) {
         self.guests.lose_process(prefix);
-        self.strangers.retain(|gid, _| !gid.0.starts_with(prefix));
+        self.strangers.retain(|gid, _| !gid.as_bytes().starts_with(prefix));
         if let Ok(process) = prefix.try_into() {
             self.members.lose(process, Instant::now());
         }
-        self.nodes.retain(|gid, _| !gid.0.starts_with(prefix));
+        self.nodes.retain(|gid, _| !gid.as_bytes().starts_with(prefix));
         for matched in self.matched.values_mut() {
-            matched.retain(|gid| !gid.0.starts_with(prefix));
+            matched.retain(|gid| !gid.as_bytes().starts_with(prefix));
         }
     }
 
@@ -518,5 +500,5 @@ fn fully_qualified(node: &NodeEntitiesInfo) -> String {
 }
 
 fn gid_msg(gid: &Gid) -> rmw_dds_common::Gid {
-    rmw_dds_common::Gid { data: gid.0 }
+    rmw_dds_common::Gid { data: gid.to_bytes16() }
 }

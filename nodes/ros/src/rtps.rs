@@ -2,10 +2,15 @@
 //!
 //! Layouts are those of the DDSI-RTPS specification 2.3, sections 8.3 and 9.4 to 9.6, little-endian.
 
-use crate::endpoint::Gid;
+use ros2_client::Gid;
 
 /// What the first twelve bytes of each identity in a process are.
 pub(crate) type Prefix = [u8; 12];
+
+/// What all identities in the process of this endpoint have in common.
+pub(crate) fn prefix_of(endpoint: Gid) -> Prefix {
+    std::array::from_fn(|index| endpoint.as_bytes()[index])
+}
 
 /// Identity of an endpoint within its process.
 pub(crate) type EntityId = [u8; 4];
@@ -98,7 +103,7 @@ impl Datagram {
             Claim::Reliable => 2,
         };
         let mut parameters = Parameters::default();
-        parameters.put(0x005a, &reader.gid.0);
+        parameters.put(0x005a, reader.gid.as_bytes());
         parameters.put_text(0x0005, &reader.topic);
         parameters.put_text(0x0007, &reader.type_name);
         parameters.put(0x001a, &[&reliability.to_le_bytes()[..], &[0; 8]].concat());
@@ -110,7 +115,7 @@ impl Datagram {
     /// Says that a writer is gone; `number` counts what this source says of writers.
     pub(crate) fn writer_gone(self, writer: Gid, number: u32) -> Self {
         let (mut parameters, mut inline) = (Parameters::default(), Parameters::default());
-        parameters.put(0x005a, &writer.0);
+        parameters.put(0x005a, writer.as_bytes());
         // Status info: disposed and unregistered, big-endian by definition.
         inline.put(0x0071, &[0, 0, 0, 3]);
         self.data(WITH_KEY, WRITERS_READER, WRITERS_WRITER, number, &inline.finish(), &parameters.finish())
@@ -232,7 +237,7 @@ mod tests {
     /// The example of a reliable reader is byte for byte what a program of others sent, but for the reader's QoS.
     #[test]
     fn a_reader_is_described_as_discovery_describes_it() {
-        let gid = Gid([1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 0x10, 4]);
+        let gid = Gid::from([1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 0x10, 4]);
         let reader = Described { gid, topic: "rt/a".to_owned(), type_name: "p::msg::dds_::T_".to_owned() };
         let datagram = Datagram::from(SOURCE).reader(&reader, Claim::BestEffort, 3);
         let mut expected = vec![];
@@ -241,7 +246,7 @@ mod tests {
         expected.extend_from_slice(&[0x15, 5, 136, 0, 0, 0, 16, 0]);
         expected.extend_from_slice(&[0, 0, 4, 0xc7, 0, 0, 4, 0xc2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 3, 0, 0]);
         expected.extend_from_slice(&[0x5a, 0, 16, 0]);
-        expected.extend_from_slice(&gid.0);
+        expected.extend_from_slice(gid.as_bytes());
         expected.extend_from_slice(b"\x05\0\x0c\0\x05\0\0\0rt/a\0\0\0\0");
         expected.extend_from_slice(b"\x07\0\x18\0\x11\0\0\0p::msg::dds_::T_\0\0\0\0");
         expected.extend_from_slice(&[0x1a, 0, 12, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);

@@ -9,44 +9,26 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
-use rustdds::{GUID, SampleIdentity, SequenceNumber};
+use ros2_client::{Gid, RmwRequestId};
+use rustdds::{SampleIdentity, SequenceNumber};
 use serde::{Deserialize, Serialize};
 use swath_msgs::{RosMessage, RosService};
 
 use crate::cdr::Cdr;
-use crate::endpoint::{Gid, RawPublisher, RawSample, RawSubscription};
+use crate::endpoint::{RawPublisher, RawSample, RawSubscription};
+use crate::environment::Mapping;
 use crate::error::RosError;
 use crate::message::{decode, decode_as, encode, encode_as};
-use crate::replies::{Replies, Reply};
-use crate::rtps::Prefix;
+use crate::replies::{AllReplies, Replies, Reply};
+use crate::rtps::{Prefix, prefix_of};
 use crate::signal::Signal;
-
-/// How requests and responses are told apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mapping {
-    /// As rmw_cyclonedds does it.
-    Cyclone,
-    /// As rmw_fastrtps and rmw_connextdds do it.
-    Enhanced,
-}
-
-impl Mapping {
-    /// The mapping that the nodes around use, by the value of `RMW_IMPLEMENTATION`.
-    pub fn for_middleware(rmw_implementation: Option<&str>) -> Self {
-        match rmw_implementation {
-            Some(name) if name.contains("fastrtps") || name.contains("connext") => Self::Enhanced,
-            _ => Self::Cyclone,
-        }
-    }
-}
 
 /// Names a request among all requests of all clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RequestId {
     /// The client's process.
     process: Prefix,
-    client: [u8; 16],
-    number: i64,
+    request: RmwRequestId,
 }
 
 /// A message with the header that [`Mapping::Cyclone`] puts before it.
@@ -60,22 +42,17 @@ struct Framed<M> {
 
 impl RequestId {
     fn new(client: Gid, number: i64) -> Self {
-        Self { process: client.prefix(), client: client.0, number }
-    }
-
-    fn of(identity: SampleIdentity) -> Self {
-        Self::new(identity.writer_guid.into(), identity.sequence_number.into())
-    }
-
-    fn identity(self) -> SampleIdentity {
-        SampleIdentity {
-            writer_guid: GUID::from_bytes(self.client),
-            sequence_number: SequenceNumber::from(self.number),
-        }
+        Self::from(RmwRequestId { writer_gid: client, sequence_number: number })
     }
 
     fn second_half(self) -> [u8; 8] {
-        std::array::from_fn(|index| self.client[8 + index])
+        std::array::from_fn(|index| self.request.writer_gid.as_bytes()[8 + index])
+    }
+}
+
+impl From<RmwRequestId> for RequestId {
+    fn from(request: RmwRequestId) -> Self {
+        Self { process: prefix_of(request.writer_gid), request }
     }
 }
 
@@ -83,7 +60,7 @@ impl Mapping {
     fn wrap<M: RosMessage>(self, id: RequestId, message: M) -> Result<Cdr, RosError> {
         match self {
             Self::Cyclone => {
-                let framed = Framed { client: id.second_half(), number: id.number, message };
+                let framed = Framed { client: id.second_half(), number: id.request.sequence_number, message };
                 encode_as(M::TYPE_NAME, &framed)
             }
             Self::Enhanced => encode(&message),
@@ -93,7 +70,7 @@ impl Mapping {
     /// The identity that goes beside a response, in its sample's header. With [`Mapping::Cyclone`] it is in the message;
     /// beside it, RustDDS would fill datagrams beyond what UDP takes, and no response over 64 kB would arrive.
     fn beside(self, id: RequestId) -> Option<SampleIdentity> {
-        (self == Self::Enhanced).then(|| id.identity())
+        (self == Self::Enhanced).then(|| id.request.into())
     }
 
     /// Takes a request or response apart. `client` is whose first half of the identity counts.
@@ -101,20 +78,18 @@ impl Mapping {
         match self {
             Self::Cyclone => {
                 let framed: Framed<M> = decode_as(M::TYPE_NAME, &sample.cdr)?;
-                let mut id = RequestId::new(client, framed.number);
-                id.client[8..].copy_from_slice(&framed.client);
-                Ok((id, framed.message))
+                let mut named = *client.as_bytes();
+                named[8..].copy_from_slice(&framed.client);
+                let request = RmwRequestId { writer_gid: named.into(), sequence_number: framed.number };
+                Ok((RequestId { process: prefix_of(client), request }, framed.message))
             }
             Self::Enhanced => {
-                let own = RequestId::new(sample.info.writer, sample.info.sequence_number);
-                let id = match sample.info.related.map(RequestId::of) {
-                    Some(related) if related.number == i64::from(SequenceNumber::UNKNOWN) => {
-                        RequestId { number: own.number, ..related }
-                    }
-                    Some(related) => related,
-                    None => own,
-                };
-                Ok((id, decode(&sample.cdr)?))
+                let own = RmwRequestId { writer_gid: sample.info.writer, sequence_number: sample.info.sequence_number };
+                let mut id = sample.info.related.map_or(own, RmwRequestId::from);
+                if id.sequence_number == i64::from(SequenceNumber::UNKNOWN) {
+                    id.sequence_number = own.sequence_number;
+                }
+                Ok((id.into(), decode(&sample.cdr)?))
             }
         }
     }
@@ -129,10 +104,9 @@ pub struct Server<S> {
 }
 
 impl<S: RosService> Server<S> {
-    pub(crate) fn new(requests: RawSubscription, responses: RawPublisher, mapping: Mapping) -> Self {
-        let roster = Arc::clone(responses.roster());
+    pub(crate) fn new(requests: RawSubscription, responses: RawPublisher, mapping: Mapping, all: &AllReplies) -> Self {
         let responses = Arc::new(Replies::new(responses));
-        roster.mind_replies(&responses);
+        all.add(&responses);
         Self { requests, responses, mapping, service: PhantomData }
     }
 
@@ -206,7 +180,7 @@ impl<S: RosService> Client<S> {
         let sent = self.requests.send(cdr, None)?;
         Ok(match self.mapping {
             Mapping::Cyclone => id,
-            Mapping::Enhanced => RequestId::of(sent),
+            Mapping::Enhanced => RmwRequestId::from(sent).into(),
         })
     }
 
@@ -215,7 +189,7 @@ impl<S: RosService> Client<S> {
         let own = self.requests.gid();
         while let Some(sample) = self.responses.take()? {
             match self.mapping.unwrap(&sample, own) {
-                Ok((id, response)) if id.client == own.0 => return Ok(Some((id, response))),
+                Ok((id, response)) if id.request.writer_gid == own => return Ok(Some((id, response))),
                 // Meant for another client.
                 Ok(_) => {}
                 Err(error) => self.responses.note_unreadable(|| error.to_string()),
@@ -264,27 +238,14 @@ mod tests {
     use crate::endpoint::SampleInfo;
 
     fn sample(cdr: Cdr, related: Option<SampleIdentity>) -> RawSample {
-        let writer = Gid(std::array::from_fn(|index| index as u8));
+        let writer = Gid::from(std::array::from_fn(|index| index as u8));
         let info = SampleInfo { source_time_ns: None, received_time_ns: 0, writer, sequence_number: 5, related };
         RawSample { cdr, info }
     }
 
     #[test]
-    fn the_middleware_decides_on_the_mapping() {
-        for (name, mapping) in [
-            (None, Mapping::Cyclone),
-            (Some("rmw_cyclonedds_cpp"), Mapping::Cyclone),
-            (Some("rmw_fastrtps_cpp"), Mapping::Enhanced),
-            (Some("rmw_fastrtps_dynamic_cpp"), Mapping::Enhanced),
-            (Some("rmw_connextdds"), Mapping::Enhanced),
-        ] {
-            assert_eq!(Mapping::for_middleware(name), mapping, "{name:?}");
-        }
-    }
-
-    #[test]
     fn cyclone_frames_carry_client_and_number_before_the_message() {
-        let client = Gid(std::array::from_fn(|index| index as u8));
+        let client = Gid::from(std::array::from_fn(|index| index as u8));
         let id = RequestId::new(client, 7);
         let text = Text { data: "a".to_owned() };
         let cdr = Mapping::Cyclone.wrap(id, text.clone()).unwrap();
@@ -298,16 +259,16 @@ mod tests {
     #[test]
     fn enhanced_requests_are_named_by_the_sample() {
         let text = Text { data: "a".to_owned() };
-        let id = RequestId::new(Gid([9; 16]), 7);
+        let id = RequestId::new([9; 16].into(), 7);
         let cdr = Mapping::Enhanced.wrap(id, text.clone()).unwrap();
         assert_eq!(cdr, encode(&text).unwrap());
         let unwrap = |related| {
             let sample = sample(cdr.clone(), related);
-            Mapping::Enhanced.unwrap::<Text>(&sample, Gid([0; 16])).unwrap().0
+            Mapping::Enhanced.unwrap::<Text>(&sample, Gid::ZERO).unwrap().0
         };
-        assert_eq!(unwrap(Some(id.identity())), id);
-        assert_eq!(unwrap(None).number, 5);
-        let unknown = RequestId { number: SequenceNumber::UNKNOWN.into(), ..id };
-        assert_eq!(unwrap(Some(unknown.identity())), RequestId { number: 5, ..id });
+        assert_eq!(unwrap(Some(id.request.into())), id);
+        assert_eq!(unwrap(None).request.sequence_number, 5);
+        let unknown = RmwRequestId { sequence_number: SequenceNumber::UNKNOWN.into(), ..id.request };
+        assert_eq!(unwrap(Some(unknown.into())), RequestId::new(id.request.writer_gid, 5));
     }
 }

@@ -2,12 +2,25 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::error::RosError;
 use crate::signal::Signal;
+
+/// A signal that comes so soon after the first is the same wish: Ctrl-C goes to all programs of a terminal, and what
+/// started a program passes it on.
+const SAME_WISH: Duration = Duration::from_secs(1);
+
+/// Whether a signal has asked this process to end.
+static SIGNALLED: AtomicBool = AtomicBool::new(false);
+
+/// Whether a signal that is watched for has come.
+pub(crate) fn signalled() -> bool {
+    SIGNALLED.load(Ordering::Relaxed)
+}
 
 /// Whether the process was asked to end. Clones are the same wish.
 #[derive(Clone, Default)]
@@ -16,7 +29,8 @@ pub struct Shutdown {
 }
 
 impl Shutdown {
-    /// Watches for Ctrl-C and SIGTERM, which raise `signal` too. A second one ends the process.
+    /// Watches for Ctrl-C and SIGTERM, which raise `signal` too. One that comes more than a second later ends the
+    /// process.
     pub fn on_signals(signal: &Signal) -> Result<Self, RosError> {
         let shutdown = Self::default();
         let mut signals = Signals::new([SIGINT, SIGTERM])
@@ -25,10 +39,12 @@ impl Shutdown {
         std::thread::Builder::new()
             .name("signals".to_owned())
             .spawn(move || {
+                let mut first = None;
                 for number in signals.forever() {
-                    if watcher.asked() {
+                    if first.get_or_insert_with(Instant::now).elapsed() > SAME_WISH {
                         std::process::exit(128 + number);
                     }
+                    SIGNALLED.store(true, Ordering::Relaxed);
                     watcher.ask();
                     wake.raise();
                 }

@@ -7,15 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
 
+use ros2_client::Gid;
 use rustdds::dds::{ReadResult, WriteResult};
 use rustdds::no_key::{DataWriter, DeserializedCacheChange, SimpleDataReader};
 use rustdds::{RTPSEntity as _, SampleIdentity, WriteOptions};
 
 use crate::cdr::{Adapter, Cdr};
-use crate::dds::Entities;
-use crate::endpoint::Gid;
+use crate::entities::{Entities, Plan};
 use crate::error::RosError;
-use crate::qos::{Durability, QosProfile};
+use crate::qos::Durability;
 use crate::signal::{Signal, lock};
 
 /// How long the last samples of a writer that goes may take to arrive.
@@ -27,16 +27,6 @@ const LINGER: Duration = Duration::from_millis(50);
 
 type DdsWriter = DataWriter<Cdr, Adapter>;
 type DdsReader = SimpleDataReader<Cdr, Adapter>;
-
-/// What an endpoint is made from.
-#[derive(Clone, Debug)]
-pub(crate) struct Plan {
-    /// DDS name of the topic.
-    pub(crate) topic: String,
-    /// DDS name of its type.
-    pub(crate) type_name: String,
-    pub(crate) qos: QosProfile,
-}
 
 /// What can be made anew with another participant.
 pub(crate) trait Slot: Send + Sync {

@@ -5,9 +5,10 @@ use std::marker::PhantomData;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use ros2_client::Gid;
 use swath_msgs::RosMessage;
 
-use crate::endpoint::{Gid, RawPublisher, RawSample, RawSubscription, SampleInfo};
+use crate::endpoint::{RawPublisher, RawSample, RawSubscription, SampleInfo};
 use crate::error::RosError;
 use crate::graph::OPERATOR;
 use crate::members::Standing;

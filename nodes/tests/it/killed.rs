@@ -54,7 +54,7 @@ fn nothing_acknowledged_is_lost_when_the_request_manager_is_killed_again_and_aga
 }
 
 #[test]
-#[ignore = "takes minutes: cargo test --release -p swath-nodes --test killed -- --ignored --nocapture"]
+#[ignore = "takes minutes: cargo test --release -p swath-nodes --test it killed -- --ignored --nocapture"]
 fn nothing_acknowledged_is_lost_when_the_request_manager_is_killed_a_hundred_times() {
     kill_and_look(100);
 }

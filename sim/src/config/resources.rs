@@ -299,9 +299,7 @@ impl ResourcesConfig {
             let [x, y, z] = direction;
             in_range(name, (x * x + y * y + z * z).sqrt(), 1e-6, 1e6)?;
         }
-        for (name, torque) in [("resources.disturbance_nm", self.disturbance_nm)] {
-            torque.into_iter().try_for_each(|it| in_range(name, it, -1e-2, 1e-2))?;
-        }
+        self.disturbance_nm.into_iter().try_for_each(|it| in_range("resources.disturbance_nm", it, -1e-2, 1e-2))?;
         self.residual_dipole_am2
             .into_iter()
             .try_for_each(|it| in_range("resources.residual_dipole_am2", it, -100.0, 100.0))?;

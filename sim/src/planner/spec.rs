@@ -11,6 +11,7 @@ use super::decision::Planner;
 use super::heuristic::Heuristic;
 use super::lookahead::{Beam, BeamSearch, Lookahead};
 use super::random::Random;
+use super::repair::{Aspen, Method, Repair};
 
 /// Kinds of policies: hybrid ones with a transformer, with an MLP, standard hybrid PPO, and PPO over a grid.
 const KINDS: [&str; 4] = ["hop-ppo", "hop-ppo-mlp", "h-ppo", "discrete-ppo"];
@@ -23,8 +24,12 @@ const MARGIN_MAX: u32 = 240;
 /// Longest fixed transition [s].
 const T_PRE_MAX_S: f64 = 600.0;
 
-/// A planner by name: `lookahead`, `lookahead:TICKS` for a margin that is not adapted, `beam`, `beam:WIDTHxDEPTH`, `heuristic:SECONDS`, `random`, or a
-/// kind of policy such as `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another; with
+/// Most closed-loop ticks that `repair` may fly in the head for a decision.
+const BUDGET_MAX: u64 = 100_000_000;
+
+/// A planner by name: `lookahead`, `lookahead:TICKS` for a margin that is not adapted, `beam`, `beam:WIDTHxDEPTH`,
+/// `repair` and `aspen`, each also with `-annealing` or `-squeaky` for another search, `repair:TICKS` for another budget,
+/// `heuristic:SECONDS`, `random`, or a kind of policy such as `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another; with
 /// `hop-ppo+lookahead` its proposals are flown in the head.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -33,6 +38,15 @@ pub enum PlannerSpec {
     Lookahead(Option<u32>),
     /// Flies sequences of candidates in its head.
     Beam(BeamSearch),
+    /// Repairs its plan on board all the time, as CASPER.
+    Repair {
+        /// How better plans are sought.
+        method: Method,
+        /// Closed-loop ticks that it may fly in the head for a decision; none for the default.
+        ticks: Option<u64>,
+    },
+    /// Makes a plan on the ground that is flown as it is, as ASPEN.
+    Aspen(Method),
     /// The paper's heuristic with a fixed transition time [s].
     Heuristic(f64),
     /// A uniform strip and a uniform transition time.
@@ -78,6 +92,13 @@ impl FromStr for PlannerSpec {
             ("beam", None) => Ok(Self::Beam(BeamSearch::default())),
             ("beam", Some(shape)) => beam(shape)
                 .ok_or_else(|| unknown("the beam must be WIDTHxDEPTH, with a width of 1 to 64 and a depth of 1 to 8")),
+            ("repair" | "repair-annealing" | "repair-squeaky", ticks) => match ticks.map(str::parse).transpose() {
+                Ok(ticks) if ticks.is_none_or(|ticks| (1..=BUDGET_MAX).contains(&ticks)) => {
+                    Ok(Self::Repair { method: method(word), ticks })
+                }
+                _ => Err(unknown("the budget must be a whole number of ticks from 1 to 100 000 000")),
+            },
+            ("aspen" | "aspen-annealing" | "aspen-squeaky", None) => Ok(Self::Aspen(method(word))),
             ("heuristic", Some(seconds)) => match seconds.parse() {
                 Ok(t_pre_s) if (0.0..=T_PRE_MAX_S).contains(&t_pre_s) => Ok(Self::Heuristic(t_pre_s)),
                 _ => Err(unknown("the transition time must be a number of seconds from 0 to 600")),
@@ -87,14 +108,23 @@ impl FromStr for PlannerSpec {
                 let kind = KINDS.into_iter().find(|kind| *kind == word);
                 let kind = kind.ok_or_else(|| {
                     unknown(
-                        "expected lookahead[:TICKS], beam[:WIDTHxDEPTH], heuristic:SECONDS, random, or hop-ppo, hop-ppo-mlp, \
-                         h-ppo or discrete-ppo, then +lookahead to fly its proposals in the head, and :FILE for a \
-                         policy that is not shipped",
+                        "expected lookahead[:TICKS], beam[:WIDTHxDEPTH], repair[:TICKS] or aspen, each also with -annealing \
+                         or -squeaky, heuristic:SECONDS, random, or hop-ppo, hop-ppo-mlp, h-ppo or discrete-ppo, then \
+                         +lookahead to fly its proposals in the head, and :FILE for a policy that is not shipped",
                     )
                 })?;
                 Ok(Self::Learned { kind: kind.to_owned(), file: rest.map(PathBuf::from), lookahead })
             }
         }
+    }
+}
+
+/// The search that a name ends with.
+fn method(word: &str) -> Method {
+    match word.split_once('-') {
+        Some((_, "annealing")) => Method::Annealing,
+        Some((_, "squeaky")) => Method::Squeaky,
+        _ => Method::Repair,
     }
 }
 
@@ -126,6 +156,11 @@ impl fmt::Display for PlannerSpec {
             Self::Lookahead(Some(margin)) => write!(f, "lookahead:{margin}"),
             Self::Beam(beam) if *beam == BeamSearch::default() => write!(f, "beam"),
             Self::Beam(beam) => write!(f, "beam:{}x{}", beam.width, beam.depth),
+            Self::Repair { method, ticks } => {
+                write!(f, "repair{}", method.ending())?;
+                ticks.map_or(Ok(()), |ticks| write!(f, ":{ticks}"))
+            }
+            Self::Aspen(method) => write!(f, "aspen{}", method.ending()),
             Self::Heuristic(t_pre_s) => write!(f, "heuristic:{t_pre_s}"),
             Self::Random => write!(f, "random"),
             Self::Learned { kind, file, lookahead } => {
@@ -143,6 +178,10 @@ impl PlannerSpec {
         match *self {
             Self::Lookahead(margin) => Some(Box::new(margin.map_or_else(Lookahead::default, Lookahead::with_margin))),
             Self::Beam(beam) => Some(Box::new(Beam::new(beam))),
+            Self::Repair { method, ticks } => Some(Box::new(
+                ticks.map_or_else(|| Repair::new(method, seed), |ticks| Repair::with_budget(method, ticks, seed)),
+            )),
+            Self::Aspen(method) => Some(Box::new(Aspen::new(method, seed))),
             Self::Heuristic(t_pre_s) => Some(Box::new(Heuristic { t_pre_s })),
             Self::Random => Some(Box::new(Random { seed })),
             Self::Learned { .. } => None,
@@ -175,6 +214,12 @@ mod tests {
             "beam",
             "beam:4x2",
             "hop-ppo+lookahead:a",
+            "repair",
+            "repair:30000",
+            "repair-squeaky:7",
+            "repair-annealing",
+            "aspen",
+            "aspen-squeaky",
         ] {
             assert_eq!(name.parse::<PlannerSpec>().unwrap().to_string(), name);
         }
@@ -188,6 +233,10 @@ mod tests {
             "heuristic",
             "beam:0x2",
             "beam:4",
+            "repair:0",
+            "repair:much",
+            "aspen:4",
+            "aspen-clever",
         ] {
             assert!(name.parse::<PlannerSpec>().unwrap_err().to_string().contains(name));
         }

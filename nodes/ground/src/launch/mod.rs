@@ -125,7 +125,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
     if let Some(error) = failure {
         return Err(error);
     }
-    match made_instead(&summary.deciders, &mission.planner) {
+    match summary.decided_instead.values().sum::<u64>() {
         0 => Ok(ExitCode::SUCCESS),
         count => {
             out::say(format_args!("{count} decisions were not made by {}, which was asked for", mission.planner));
@@ -180,7 +180,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
-        deciders: planner.planner.deciders().clone(),
+        decided_instead: made_instead(planner.planner.deciders().clone(), &mission.planner),
         failure: failure.as_ref().map(out::chain),
         seed: mission.seed,
         orbits: mission.orbits,

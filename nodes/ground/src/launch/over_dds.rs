@@ -16,7 +16,7 @@ use super::fleet::Fleet;
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use swath_mission::file::Mission;
-use swath_mission::guarded::{Deciders, Policies};
+use swath_mission::guarded::{Deciders, Policies, made_instead};
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
@@ -67,7 +67,7 @@ pub fn fly(
     let model = mission.model()?;
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
-        deciders: launcher.deciders.clone(),
+        decided_instead: made_instead(launcher.deciders.clone(), &mission.planner),
         failure: failure.as_ref().map(out::chain),
         seed: mission.seed,
         orbits: mission.orbits,

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use swath_node::out;
 
-use super::files::{CuttingArgs, cut_json, cut_text, read_files, write_file};
+use super::files::{CuttingArgs, Files, cut_json, cut_text, write_file};
 
 /// `swath strips cover`.
 #[derive(Debug, Args)]
@@ -29,7 +29,8 @@ pub struct CoverArgs {
 /// # Errors
 /// When a file cannot be used, the strips cannot be written, or something is no strip.
 pub fn cover(args: &CoverArgs) -> Result<()> {
-    let import = read_files(&args.files, &args.cutting.usual()?)?;
+    let cutting = args.cutting.usual()?;
+    let import = Files::read(&args.files)?.cut(&cutting);
     if let Some(path) = &args.out {
         write_file(path, &import)?;
     }

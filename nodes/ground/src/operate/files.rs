@@ -14,7 +14,9 @@ use swath_sim::config::SimConfig;
 
 use super::client::Operator;
 use swath_mission::orders::cutting::{Cutting, SWATH_KM};
-use swath_mission::orders::import::{Cut, Import, Shown, import, write};
+use swath_mission::orders::feature::Part;
+use swath_mission::orders::formats::Features;
+use swath_mission::orders::import::{Cut, Import, Shown, features, import_features, write};
 
 /// How lines and areas become strips.
 #[derive(Debug, Args)]
@@ -45,6 +47,7 @@ impl CuttingArgs {
     /// # Errors
     /// When nobody answers or an option is out of range.
     pub fn of_mission(&self, operator: &Operator) -> Result<Cutting> {
+        self.usual()?;
         let limits = operator.desk(&graph::GET_LIMITS)?.call(msg::GetLimitsRequest::default())?;
         self.with(&cutting_of(&limits))
     }
@@ -54,6 +57,7 @@ impl CuttingArgs {
     /// # Errors
     /// When an option is out of range.
     pub fn of_any(&self) -> Result<Cutting> {
+        self.usual()?;
         let operator = Operator::start()?;
         let limits = operator.desk_within(&graph::GET_LIMITS, DRY_PATIENCE);
         match limits.and_then(|desk| desk.call(msg::GetLimitsRequest::default())) {
@@ -105,24 +109,42 @@ fn cutting_of(limits: &msg::GetLimitsResponse) -> Cutting {
     }
 }
 
-/// Reads the strips of files, `-` for standard input; what is no strip is told on stderr.
-///
-/// # Errors
-/// When a file as a whole cannot be read.
-pub fn read_files(files: &[PathBuf], cutting: &Cutting) -> Result<Import> {
-    ensure!(files.iter().filter(|file| file.as_os_str() == "-").count() < 2, "standard input can be read once");
-    let mut all = Import::default();
-    for file in files {
-        let import = import(file, cutting)?;
-        for fault in &import.refused {
-            out::say(printable(&fault.to_string()));
-        }
-        all.shapes += import.shapes;
-        all.orders.extend(import.orders);
-        all.cut.extend(import.cut);
-        all.refused.extend(import.refused);
+/// Files as they were read, before anybody is asked how long a strip may be.
+pub struct Files(Vec<(PathBuf, Features)>);
+
+impl Files {
+    /// Reads files, `-` for standard input.
+    ///
+    /// # Errors
+    /// When a file as a whole cannot be read.
+    pub fn read(files: &[PathBuf]) -> Result<Self> {
+        ensure!(files.iter().filter(|file| file.as_os_str() == "-").count() < 2, "standard input can be read once");
+        Ok(Self(files.iter().map(|file| Ok((file.clone(), features(file)?))).collect::<Result<_>>()?))
     }
-    Ok(all)
+
+    /// How many lines and areas there are.
+    #[must_use]
+    pub fn shapes(&self) -> usize {
+        let parts = self.0.iter().flat_map(|(_, features)| features.iter().flatten()).flat_map(|it| &it.parts);
+        parts.filter(|part| !matches!(part, Part::Other(_))).count()
+    }
+
+    /// Makes strips of them; what is no strip is told on stderr.
+    #[must_use]
+    pub fn cut(self, cutting: &Cutting) -> Import {
+        let mut all = Import::default();
+        for (file, features) in self.0 {
+            let import = import_features(features, &file, cutting);
+            for fault in &import.refused {
+                out::say(printable(&fault.to_string()));
+            }
+            all.shapes += import.shapes;
+            all.orders.extend(import.orders);
+            all.cut.extend(import.cut);
+            all.refused.extend(import.refused);
+        }
+        all
+    }
 }
 
 /// Writes strips to a file, `-` for standard output.

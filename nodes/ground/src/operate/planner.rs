@@ -10,6 +10,7 @@ use swath_node::out;
 use swath_ros::graph;
 
 use super::client::Operator;
+use super::files::printable;
 
 /// `swath planner`.
 #[derive(Debug, Args)]
@@ -152,7 +153,10 @@ pub fn status_text(status: &msg::PlannerStatus) -> String {
         };
         text += &format!(
             "proposal {}: strip {} {} after {} ticks of transition; {decided}\n",
-            status.proposal, status.strip.id, status.strip.name, status.t_pre_ticks
+            status.proposal,
+            status.strip.id,
+            printable(&status.strip.name),
+            status.t_pre_ticks
         );
     }
     if !status.last_outcome.is_empty() {

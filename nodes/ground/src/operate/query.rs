@@ -10,7 +10,7 @@ use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
 
 use super::client::{Operator, check};
-use super::files::{CuttingArgs, read_files};
+use super::files::{CuttingArgs, Files};
 use super::selection::Common;
 use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
 use crate::requests::json::status_json;
@@ -81,10 +81,10 @@ pub struct ShowArgs {
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or a strip would be refused.
-#[expect(clippy::print_stdout, reason = "the answers are this command's result")]
 pub fn preview(args: &PreviewArgs) -> Result<()> {
+    let files = Files::read(&args.files)?;
     let operator = Operator::start()?;
-    let import = read_files(&args.files, &args.cutting.of_mission(&operator)?)?;
+    let import = files.cut(&args.cutting.of_mission(&operator)?);
     let horizon_s = args.hours.map_or(0.0, |hours| hours * 3600.0);
     let mut calls: Vec<_> = import
         .orders
@@ -204,7 +204,6 @@ impl Standing {
 ///
 /// # Errors
 /// When nobody answers or there is no such strip.
-#[expect(clippy::print_stdout, reason = "the report is this command's result")]
 pub fn show(args: &ShowArgs) -> Result<()> {
     let operator = Operator::start()?;
     let call = msg::GetStripRequest {

@@ -10,7 +10,6 @@ use crate::requests::json::{history_json, state_name, status_json, time, time_js
 
 /// Prints what became of a request or of what was asked of it.
 pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json: bool) -> Result<()> {
-    let name = printable(name);
     out::print_line(if as_json {
         let line = json!({
             "name": name, "accepted": result.accepted, "id": result.id,
@@ -18,9 +17,10 @@ pub fn print_result(name: &str, done: &str, result: &msg::SubmitResult, as_json:
         });
         line.to_string()
     } else if result.accepted {
-        format!("{done:<9} {:>7}  {name}", result.id)
+        format!("{done:<9} {:>7}  {}", result.id, printable(name))
     } else {
-        format!("refused   {:>7}  {name}: {} (reason {})", "-", printable(&result.reason), result.reason_code)
+        let (name, reason) = (printable(name), printable(&result.reason));
+        format!("refused   {:>7}  {name}: {reason} (reason {})", "-", result.reason_code)
     })?;
     Ok(())
 }
@@ -35,9 +35,8 @@ pub fn status_head() -> String {
 
 /// A request as a line of a table.
 pub fn status_line(status: &msg::StripStatus) -> String {
-    let reason = if status.reason.is_empty() { String::new() } else { format!(": {}", status.reason) };
     format!(
-        "{:>7}  {:<19} {:>4.2} {:>3}  {:<20}  {:<20}  {:<20}  {}{reason}",
+        "{:>7}  {:<19} {:>4.2} {:>3}  {:<20}  {:<20}  {:<20}  {}{}",
         status.strip.id,
         state_name(status.state),
         status.strip.priority,
@@ -45,8 +44,14 @@ pub fn status_line(status: &msg::StripStatus) -> String {
         time(&status.window_open),
         time(&status.window_close),
         time(&status.imaging),
-        status.strip.name,
+        printable(&status.strip.name),
+        because(&status.reason),
     )
+}
+
+/// A reason behind what it is the reason for.
+fn because(reason: &str) -> String {
+    if reason.is_empty() { String::new() } else { format!(": {}", printable(reason)) }
 }
 
 /// A chance, for machines.
@@ -132,18 +137,18 @@ pub fn report_text(report: &msg::StripReport) -> String {
     let mut text = format!(
         "strip {} {}\n  {} since {}{}\n  from {:.4}° {:.4}° to {:.4}° {:.4}°, priority {}, {} m/s, by {} ({})\n",
         strip.id,
-        strip.name,
+        printable(&strip.name),
         state_name(status.state),
         time(&status.header.stamp),
-        if status.reason.is_empty() { String::new() } else { format!(": {}", status.reason) },
+        because(&status.reason),
         strip.start_latitude_deg,
         strip.start_longitude_deg,
         strip.end_latitude_deg,
         strip.end_longitude_deg,
         strip.priority,
         strip.acquisition_speed,
-        status.submitter,
-        status.client_ref,
+        printable(&status.submitter),
+        printable(&status.client_ref),
     );
     for (what, id) in
         [("linked to", status.linked_to), ("replaces", status.supersedes), ("replaced by", status.superseded_by)]
@@ -174,9 +179,35 @@ pub fn report_text(report: &msg::StripReport) -> String {
             time(&entry.stamp),
             entry.strip_id,
             state_name(entry.state),
-            entry.actor,
-            if entry.reason.is_empty() { String::new() } else { format!(": {}", entry.reason) },
+            printable(&entry.actor),
+            because(&entry.reason),
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operate::planner::status_text;
+
+    #[test]
+    fn what_others_wrote_does_not_steer_the_terminal() {
+        let evil = || "\x1b[2J\u{9b}1m".to_owned();
+        let strip = msg::Strip { name: evil(), ..Default::default() };
+        let status = msg::StripStatus {
+            reason: evil(),
+            submitter: evil(),
+            client_ref: evil(),
+            strip: strip.clone(),
+            ..Default::default()
+        };
+        let entry = msg::HistoryEntry { actor: evil(), reason: evil(), ..Default::default() };
+        let report = msg::StripReport { status: status.clone(), history: vec![entry], ..Default::default() };
+        let proposal = msg::PlannerStatus { proposal: 1, strip, ..Default::default() };
+        for text in [status_line(&status), report_text(&report), status_text(&proposal)] {
+            assert!(text.contains("\\u{1b}[2J"), "{text:?}");
+            assert!(!text.chars().any(|letter| letter.is_control() && letter != '\n'), "{text:?}");
+        }
+    }
 }

@@ -8,7 +8,7 @@ use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
 
 use super::client::{Operator, check};
-use super::files::{CuttingArgs, cut_json, cut_text, read_files, write_file};
+use super::files::{CuttingArgs, Files, cut_json, cut_text, write_file};
 use super::selection::{Actor, Selection};
 use super::show::print_result;
 use swath_node::orders::request_message;
@@ -20,7 +20,7 @@ const BATCH: usize = 500;
 /// `swath strips submit`.
 #[derive(Debug, Args)]
 pub struct SubmitArgs {
-    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT, CSV or shapefiles.
+    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT or CSV.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Who submits.
@@ -76,12 +76,22 @@ pub struct ReplaceArgs {
 /// # Errors
 /// When a file cannot be used, nobody answers, or something is refused.
 pub fn submit(args: &SubmitArgs) -> Result<()> {
-    let operator = if args.dry_run { None } else { Some(Operator::start()?) };
+    args.cutting.usual()?;
+    let files = Files::read(&args.files)?;
+    let operator = if args.dry_run || files.shapes() == 0 { None } else { Some(Operator::start()?) };
     let cutting = match &operator {
-        Some(operator) => args.cutting.of_mission(operator)?,
+        Some(operator) => match args.cutting.of_mission(operator) {
+            Ok(cutting) => cutting,
+            Err(error) => {
+                // What is wrong with the files is told although nobody answers.
+                _ = files.cut(&args.cutting.usual()?);
+                return Err(error);
+            }
+        },
+        None if files.shapes() == 0 => args.cutting.usual()?,
         None => args.cutting.of_any()?,
     };
-    let mut import = read_files(&args.files, &cutting)?;
+    let mut import = files.cut(&cutting);
     for order in &mut import.orders {
         order.submitter.clone_from(&args.submitter);
         order.hold_for_approval |= args.hold;
@@ -171,8 +181,12 @@ fn tell(args: &DecideArgs, ids: &[u64], done: &str, results: &[msg::SubmitResult
 /// # Errors
 /// When the file does not hold one strip, nobody answers, or the new strip is refused.
 pub fn replace(args: &ReplaceArgs) -> Result<()> {
+    let files = Files::read(std::slice::from_ref(&args.file))?;
+    if files.shapes() != 1 {
+        bail!("{} holds {} strips: one is needed to replace one", args.file.display(), files.shapes());
+    }
     let operator = Operator::start()?;
-    let import = read_files(std::slice::from_ref(&args.file), &args.cutting.of_mission(&operator)?)?;
+    let import = files.cut(&args.cutting.of_mission(&operator)?);
     let [order] = &import.orders[..] else {
         bail!("{} holds {} strips: one is needed to replace one", args.file.display(), import.orders.len());
     };

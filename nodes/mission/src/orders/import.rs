@@ -129,6 +129,14 @@ const NAMES: [&str; 4] = ["name", "Name", "NAME", "title"];
 /// # Errors
 /// When the file as a whole cannot be read.
 pub fn import(path: &Path, cutting: &Cutting) -> Result<Import, RequestsFileError> {
+    Ok(import_features(features(path)?, path, cutting))
+}
+
+/// Reads the features of a file, `-` for standard input, as they are.
+///
+/// # Errors
+/// When the file as a whole cannot be read.
+pub fn features(path: &Path) -> Result<formats::Features, RequestsFileError> {
     let unreadable = |source| RequestsFileError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     let limit = LIMIT_MB * 1_000_000 + 1;
@@ -141,9 +149,7 @@ pub fn import(path: &Path, cutting: &Cutting) -> Result<Import, RequestsFileErro
     if bytes.len() as u64 >= limit {
         return Err(RequestsFileError::TooLarge { path: path.to_owned() });
     }
-    let features = formats::read(&bytes, path);
-    let features = features.map_err(|why| RequestsFileError::Format { path: path.to_owned(), why })?;
-    Ok(import_features(features, path, cutting))
+    formats::read(&bytes, path).map_err(|why| RequestsFileError::Format { path: path.to_owned(), why })
 }
 
 /// Makes orders of a file's features.
@@ -331,6 +337,9 @@ mod tests {
     use swath_sim::config::SimConfig;
 
     use super::*;
+    use crate::shapes::sphere::{angle, direction};
+
+    const EARTH_KM: f64 = 6378.1366;
 
     fn read(path: &Path) -> Result<Vec<Order>, String> {
         let import = import(path, &cutting()).map_err(|error| format!("{:#}", anyhow::Error::from(error)))?;
@@ -424,7 +433,13 @@ mod tests {
         assert_eq!(read(file.path()).unwrap(), requests);
         let config = SimConfig::default();
         for (one, next) in requests.iter().zip(&requests[1..]) {
-            assert_eq!(one.request.end_longitude_deg, next.request.start_longitude_deg);
+            // Neighbours meet, or pass each other within the tolerance on either side.
+            let ends = [
+                [one.request.end_longitude_deg, one.request.end_latitude_deg],
+                [next.request.start_longitude_deg, next.request.start_latitude_deg],
+            ];
+            let gap = angle(&direction(ends[0]), &direction(ends[1])) * EARTH_KM;
+            assert!(gap <= 2.0 * cutting().tolerance_km, "{gap} km");
             one.request.to_strip(&config.requests, config.earth.radius_m).unwrap();
         }
     }

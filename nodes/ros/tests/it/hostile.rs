@@ -128,7 +128,7 @@ fn nobody_needs_to_say_who_it_is_where_everybody_counts() {
 /// A flood of a stranger would push the messages of members out of the room that they share.
 #[test]
 fn a_stranger_that_goes_on_is_heard_no_longer() {
-    let trial = Trial::new(11);
+    let trial = Trial::new(43);
     let guidance = trial.start(graph::GUIDANCE, "").unwrap();
     let received = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
     let mut stranger = Stranger::new(trial.domain, 6);

@@ -338,3 +338,11 @@ fn what_is_not_taken_in_time_is_counted_as_lost() {
     assert!(states.lost() > 0, "a reader that keeps 64 samples kept {taken}");
     assert_eq!(taken + states.lost(), SENT);
 }
+
+#[test]
+fn there_is_no_time_but_simulated_time() {
+    let trial = Trial::new(40);
+    let error = trial.start(graph::PLANNER, "-p use_sim_time:=false").err().unwrap().to_string();
+    assert_eq!(error, "parameter `use_sim_time`: the nodes know no time but simulated time");
+    drop(trial.start(graph::PLANNER, "-p use_sim_time:=true").unwrap());
+}

@@ -5,7 +5,7 @@ use std::process::{Child, Command};
 use std::time::Duration;
 
 use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
-use swath_ros::graph;
+use swath_ros::{Shutdown, graph};
 
 use crate::common::{PATIENCE, Trial, eventually};
 use crate::stranger::Stranger;
@@ -101,5 +101,33 @@ fn a_process_that_wants_too_much_memory_ends() {
         stranger.send_file(file, false);
         let status = eventually(|| guidance.0.try_wait().unwrap());
         assert_eq!(status.signal(), Some(SIGABRT), "{file}: {status}");
+    }
+}
+
+#[test]
+#[ignore = "the process of another test"]
+fn spacecraft_that_waits() {
+    let spacecraft = trial_of_parent().start(graph::SPACECRAFT, "").unwrap();
+    let shutdown = Shutdown::on_signals(spacecraft.signal()).unwrap();
+    // Nobody comes: only a signal ends this before the parent's patience does.
+    spacecraft.wait_for_peers(&[graph::GUIDANCE], 10 * PATIENCE).unwrap();
+    assert!(shutdown.asked());
+}
+
+#[test]
+fn signals_end_the_wait_for_peers() {
+    for (number, signal) in [(41, "-INT"), (42, "-TERM")] {
+        let trial = Trial::new(number);
+        let watcher = trial.start(graph::PLANNER, "").unwrap();
+        let mut spacecraft = Process::start("stopped::spacecraft_that_waits", &trial);
+        eventually(|| watcher.nodes().contains(&trial.full("spacecraft")).then_some(()));
+        std::thread::sleep(Duration::from_millis(500));
+        assert!(spacecraft.0.try_wait().unwrap().is_none());
+        spacecraft.signal(signal);
+        // A second one that follows at once, as from a terminal and a launcher, is the same wish.
+        let id = spacecraft.0.id().to_string();
+        Command::new("kill").args([signal, &id]).output().unwrap();
+        let status = eventually(|| spacecraft.0.try_wait().unwrap());
+        assert!(status.success(), "{signal}: {status}");
     }
 }

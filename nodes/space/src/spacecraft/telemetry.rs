@@ -18,27 +18,28 @@ use swath_sim::vehicle::spacecraft::StateSample;
 pub const PERIOD: Parameter =
     Parameter { name: "telemetry_period_s", about: "Simulated time between frames, wheels and ground track [s]." };
 
+/// Its default [s].
+const PERIOD_S: f64 = 10.0;
+
 /// Writers of standard messages, once in a while.
 pub struct Telemetry {
     frames: Publisher<TFMessage>,
     wheels: Publisher<JointState>,
     sub_satellite: Publisher<NavSatFix>,
-    every: u64,
 }
 
 impl Telemetry {
-    /// Telemetry every `telemetry_period_s` of simulated time.
+    /// Telemetry every `telemetry_period_s` of simulated time, as that is set at the moment.
     ///
     /// # Errors
     /// When the parameter is out of range or DDS fails.
     pub fn new(base: &MissionNode) -> Result<Self> {
-        let period = Spec::new(PERIOD.name, 10.0, PERIOD.about);
-        let period = base.node.parameters().declare(period.in_range(0.1..=3600.0).read_only())?;
+        let period = Spec::new(PERIOD.name, PERIOD_S, PERIOD.about);
+        base.node.parameters().declare(period.in_range(0.1..=3600.0))?;
         Ok(Self {
             frames: base.node.publisher(&graph::TF)?,
             wheels: base.node.publisher(&graph::WHEELS)?,
             sub_satellite: base.node.publisher(&graph::SUB_SATELLITE_POINT)?,
-            every: u64::from(base.model.period.ticks_ceil(period).max(1)),
         })
     }
 
@@ -47,7 +48,9 @@ impl Telemetry {
     /// # Errors
     /// When it cannot be sent.
     pub fn publish(&self, base: &MissionNode, sample: &StateSample) -> Result<()> {
-        if !sample.tick.0.is_multiple_of(self.every) {
+        // It may be set at any time.
+        let period = base.node.parameters().get(PERIOD.name).unwrap_or(PERIOD_S);
+        if !sample.tick.0.is_multiple_of(u64::from(base.model.period.ticks_ceil(period).max(1))) {
             return Ok(());
         }
         let (cos, sin) = base.model.earth.clone().cos_sin(sample.tick);

@@ -53,6 +53,13 @@ impl Place {
         fs::write(path, bytes).unwrap();
     }
 
+    /// Removes a folder, if it is there.
+    pub fn remove(&self, name: &str) {
+        if self.path(name).exists() {
+            fs::remove_dir_all(self.path(name)).unwrap();
+        }
+    }
+
     pub fn read(&self, name: &str) -> String {
         fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }

@@ -100,7 +100,7 @@ impl ClosedLoop {
             guidance,
             integral: Vector3::zeros(),
             command: Vector3::zeros(),
-            gradient: if gravity { 3.0 * mu / orbit.radius.powi(3) } else { 0.0 },
+            gradient: if gravity { 3.0 * mu / (orbit.radius * orbit.radius * orbit.radius) } else { 0.0 },
             field,
             torquers: meta.maybe("mtb")?,
             bad_ticks: bad_ticks
@@ -234,7 +234,7 @@ pub fn gravity_tumble(meta: &Input<'_>, data: &Input<'_>) -> Result<Comparison> 
     let (mut orbit, period) = (meta.orbit()?, meta.period()?);
     let inertia = meta.maybe("I_diag")?.unwrap_or(swath_sim::config::SpacecraftConfig::default().inertia_kg_m2);
     let (plant, mut body) = (rigid(inertia, period.seconds()), meta.body()?);
-    let gradient = 3.0 * meta.number("mu")? / orbit.radius.powi(3);
+    let gradient = 3.0 * meta.number("mu")? / (orbit.radius * orbit.radius * orbit.radius);
     let ticks = data.ticks(period)?;
     let (sigmas, omegas, torques): (Rows, Rows, Rows) =
         (data.get("sigma_BN")?, data.get("omega_BN_B")?, data.get("gg_torque_B")?);

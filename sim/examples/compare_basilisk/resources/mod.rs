@@ -32,7 +32,7 @@ impl Check {
     fn add(&mut self, ours: f64, theirs: f64) {
         let difference = (ours - theirs).abs();
         // A difference that is not a number stays.
-        if !(difference <= self.difference) {
+        if difference.is_nan() || difference > self.difference {
             self.difference = difference;
         }
     }

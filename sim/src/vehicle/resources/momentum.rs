@@ -44,7 +44,7 @@ impl Thrusters {
     /// than takes it out within a tick of `dt` [s], in its direction where a thruster saturates.
     #[must_use]
     pub fn torque(&self, momentum_B: &Vector3<f64>, since: u32, dt: f64) -> Vector3<f64> {
-        if since % self.pulse_every != 0 {
+        if !since.is_multiple_of(self.pulse_every) {
             return Vector3::zeros();
         }
         let wanted = momentum_B / -dt;

@@ -4,7 +4,8 @@ use csv::{ReaderBuilder, StringRecord};
 use serde_json::Value;
 
 use super::super::feature::{Feature, Part};
-use super::{Features, FormatError, wkt};
+use super::error::{Features, FormatError};
+use super::wkt;
 
 /// Names of a column of well-known text.
 const WKT_COLUMNS: [&str; 4] = ["wkt", "geometry", "geom", "the_geom"];

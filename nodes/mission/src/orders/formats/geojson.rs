@@ -4,7 +4,7 @@ use geojson::{Feature as GeoFeature, Geometry, GeometryValue, Position};
 use serde_json::Value;
 
 use super::super::feature::{Feature, Part};
-use super::{Features, FormatError};
+use super::error::{Features, FormatError};
 use crate::shapes::sphere::Place;
 
 /// Reads a text that begins like JSON.

@@ -3,7 +3,7 @@
 use gpx::Waypoint;
 
 use super::super::feature::{Feature, Part};
-use super::{Features, FormatError};
+use super::error::{Features, FormatError};
 
 /// Reads a text that begins like XML and has a `gpx` element.
 pub(super) fn read(text: &str) -> Result<Features, FormatError> {

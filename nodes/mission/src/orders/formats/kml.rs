@@ -2,21 +2,40 @@
 
 use kml::types::{Coord, Element, Geometry, Placemark};
 use kml::{Kml, KmlReader};
+use quick_xml::Reader;
+use quick_xml::events::Event;
 use serde_json::Value;
 
 use super::super::feature::{Feature, Part};
-use super::{Features, FormatError};
+use super::error::{Features, FormatError};
 use crate::shapes::sphere::Place;
 
 /// Reads a text that begins like XML and has a `kml` element.
 pub(super) fn read(text: &str) -> Result<Features, FormatError> {
     let malformed = |error: kml::Error| FormatError::Malformed { format: "KML", reason: error.to_string() };
+    check(text)?;
     let mut features = Vec::new();
     collect(KmlReader::<_, f64>::from_string(text).read().map_err(malformed)?, &mut features);
     if features.is_empty() {
         return Err(FormatError::Malformed { format: "KML", reason: "it has no placemark".to_owned() });
     }
     Ok(features)
+}
+
+/// Refuses what is no whole XML: the reader of KML would wait for its end for ever.
+fn check(text: &str) -> Result<(), FormatError> {
+    let malformed = |reason: String| FormatError::Malformed { format: "KML", reason };
+    let mut reader = Reader::from_str(text);
+    let mut depth = 0_usize;
+    loop {
+        match reader.read_event().map_err(|error| malformed(error.to_string()))? {
+            Event::Start(_) => depth += 1,
+            Event::End(_) => depth = depth.saturating_sub(1),
+            Event::Eof if depth > 0 => return Err(malformed(format!("it ends within {depth} open elements"))),
+            Event::Eof => return Ok(()),
+            _ => {}
+        }
+    }
 }
 
 fn collect(element: Kml, features: &mut Features) {

@@ -6,7 +6,7 @@ use wkt::Wkt;
 use wkt::types::{LineString, Polygon};
 
 use super::super::feature::{Feature, Part};
-use super::{Features, FormatError};
+use super::error::{Features, FormatError};
 
 /// How geometries begin.
 const WORDS: [&str; 5] = ["LINESTRING", "MULTILINESTRING", "POLYGON", "MULTIPOLYGON", "GEOMETRYCOLLECTION"];
