@@ -1,10 +1,12 @@
 //! Speed of writing and reading bags.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench that cannot go on should panic")]
 
-use std::{hint::black_box, path::Path};
+use std::hint::black_box;
+use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use swath_bags::{Bag, BagOptions, BagWriter, Compression, Filter, Topic, qos::QosProfile};
+use swath_bags::qos::QosProfile;
+use swath_bags::{Bag, BagOptions, BagWriter, Compression, Filter, Topic};
 
 const MESSAGES: u64 = 200_000;
 const MESSAGE_BYTES: usize = 300;

@@ -5,28 +5,22 @@
 //! the other side, in Python, `bench_bags cyclone` measures both.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
 
-use std::{
-    collections::BTreeMap,
-    env,
-    io::{BufRead, BufReader},
-    path::Path,
-    process::{Command, Stdio},
-    time::{Duration, Instant},
-};
+use std::collections::BTreeMap;
+use std::env;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use swath_bags::{
-    Bag, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
-    play::{End, LAST_MESSAGES, PlayOptions, Player},
-    qos::QosProfile,
-    record::{RecordOptions, Recorder},
-    tap::Selection,
-};
+use swath_bags::play::{End, LAST_MESSAGES, PlayOptions, Player};
+use swath_bags::qos::QosProfile;
+use swath_bags::record::{RecordOptions, Recorder};
+use swath_bags::tap::Selection;
+use swath_bags::{Bag, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern};
 use swath_msgs::Interface;
-use swath_ros::{
-    Cdr, Node, RosArgs, Shutdown,
-    qos::{Durability, History, QosProfile as RosProfile, WhenFull},
-};
+use swath_ros::qos::{Durability, History, QosProfile as RosProfile, WhenFull};
+use swath_ros::{Cdr, Node, RosArgs, Shutdown};
 
 const TOPIC: &str = "/bench";
 const TYPE: &str = "std_msgs/msg/String";
@@ -279,7 +273,9 @@ fn publish(rate: u64, n: u64) -> Value {
         publisher.publish(messages[n as usize % messages.len()].clone()).unwrap();
     }
     let seconds = start.elapsed().as_secs_f64();
-    publisher.flush(Duration::from_secs(10));
+    if !publisher.flush(Duration::from_secs(10)) {
+        eprintln!("not every reader has all messages");
+    }
     std::thread::sleep(Duration::from_secs(1));
     json!({ "seconds": seconds })
 }

@@ -1,10 +1,14 @@
 //! Writes a bag of a given size, to try what a big one costs: `big_bag DIRECTORY GIGABYTES [zstd|lz4|none]`.
 #![allow(clippy::unwrap_used, reason = "an example that cannot go on should panic")]
 
-use std::{env, path::Path, time::Instant};
+use std::env;
+use std::path::Path;
+use std::time::Instant;
 
-use swath_bags::{BagOptions, BagWriter, Compression, Topic, qos::QosProfile};
-use swath_msgs::{Interface, swath_msgs::SpacecraftState};
+use swath_bags::qos::QosProfile;
+use swath_bags::{BagOptions, BagWriter, Compression, Topic};
+use swath_msgs::Interface;
+use swath_msgs::swath_msgs::SpacecraftState;
 
 fn main() {
     let args: Vec<String> = env::args().skip(1).collect();

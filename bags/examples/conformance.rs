@@ -8,14 +8,11 @@ mod conformance;
 #[path = "../tests/it/common/contents.rs"]
 mod contents;
 
-use std::{
-    collections::BTreeMap,
-    env,
-    ffi::OsStr,
-    fs, panic,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-};
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::{env, fs, panic};
 
 use contents::{Found, defined, found};
 use serde_json::{Value, json};

@@ -8,9 +8,11 @@ mod conformance;
 #[path = "../tests/it/common/mutate.rs"]
 mod mutate;
 
-use std::{env, fs, path::Path};
+use std::path::Path;
+use std::{env, fs};
 
-use swath_bags::{BagOptions, BagWriter, Compression, Topic, qos::QosProfile};
+use swath_bags::qos::QosProfile;
+use swath_bags::{BagOptions, BagWriter, Compression, Topic};
 use swath_msgs::Interface;
 
 fn main() {

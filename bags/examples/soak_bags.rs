@@ -10,17 +10,12 @@ mod conformance;
 #[path = "../tests/it/common/mutate.rs"]
 mod mutate;
 
-use std::{
-    env, panic,
-    path::Path,
-    process::exit,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-    thread,
-    time::{Duration, Instant},
-};
+use std::path::Path;
+use std::process::exit;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+use std::{env, panic, thread};
 
 use serde_json::json;
 

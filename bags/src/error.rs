@@ -1,6 +1,7 @@
 //! The one error type of this crate.
 
-use std::{io, path::PathBuf};
+use std::io;
+use std::path::PathBuf;
 
 use thiserror::Error;
 

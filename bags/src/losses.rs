@@ -19,6 +19,7 @@ impl Losses {
     const UNSAVED: &str = "lost_messages unsaved";
 
     /// All lost messages.
+    #[must_use]
     pub fn total(&self) -> u64 {
         self.by_topic.values().sum::<u64>() + self.unsaved
     }
@@ -39,6 +40,7 @@ impl Losses {
     }
 
     /// From the pairs of a [`RECORDING`] record.
+    #[must_use]
     pub fn from_metadata(metadata: &BTreeMap<String, String>) -> Self {
         let mut losses = Self::default();
         for (key, value) in metadata {

@@ -1,14 +1,14 @@
 //! `metadata.yaml` of a bag directory: rosbag2's bag information, read in versions 1 to 9, written in version 9.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 use yaml_serde::Value;
 
-use crate::{
-    error::{BagError, Result},
-    qos::{self, QosProfile},
-};
+use crate::error::{BagError, Result};
+use crate::qos::{self, QosProfile};
 
 /// The name of the file in a bag directory.
 pub const FILE_NAME: &str = "metadata.yaml";

@@ -1,9 +1,7 @@
 //! What `swath-bag` says: results on standard output, all else on standard error. That nobody reads it ends nothing.
 
-use std::{
-    io::{self, ErrorKind, Write},
-    path::Path,
-};
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 
 use crate::error::{BagError, Result};
 

@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 
-use crate::{file::chunk::Compression, writer::BagOptions};
+use crate::file::chunk::Compression;
+use crate::writer::BagOptions;
 
 /// Settings under a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -1,6 +1,7 @@
 //! ROS 2 QoS profiles as bags store them: a YAML list in rosbag2's words.
 
-use std::{borrow::Cow, collections::HashMap};
+use std::borrow::Cow;
+use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +161,7 @@ pub struct QosProfile {
 
 impl QosProfile {
     /// Reliable, volatile, keep last `depth`.
+    #[must_use]
     pub const fn reliable(depth: u64) -> Self {
         Self {
             history: History::KeepLast,
@@ -175,11 +177,13 @@ impl QosProfile {
     }
 
     /// Reliable, transient local ("latched"), keep last `depth`.
+    #[must_use]
     pub const fn latched(depth: u64) -> Self {
         Self { durability: Durability::TransientLocal, ..Self::reliable(depth) }
     }
 
     /// Best effort, volatile, keep last `depth`.
+    #[must_use]
     pub const fn best_effort(depth: u64) -> Self {
         Self { reliability: Reliability::BestEffort, ..Self::reliable(depth) }
     }
@@ -211,6 +215,7 @@ pub struct QosOverride {
 
 impl QosOverride {
     /// The profile with what is set here.
+    #[must_use]
     pub fn apply(&self, to: QosProfile) -> QosProfile {
         QosProfile {
             history: self.history.unwrap_or(to.history),
@@ -238,6 +243,9 @@ pub(crate) fn in_a_line(profile: &QosProfile) -> String {
 }
 
 /// The YAML list of a channel's `offered_qos_profiles`; empty for no profile.
+///
+/// # Errors
+/// [`BagError::Qos`] when a profile cannot be written as YAML.
 pub fn to_yaml(profiles: &[QosProfile]) -> Result<String> {
     if profiles.is_empty() {
         return Ok(String::new());

@@ -1,14 +1,13 @@
 //! What a bag knows about a topic.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use mcap::records::Channel;
 
-use crate::{
-    error::{BagError, Result},
-    file::parts::Schema,
-    qos::{self, QosProfile, QosTexts},
-};
+use crate::error::{BagError, Result};
+use crate::file::parts::Schema;
+use crate::qos::{self, QosProfile, QosTexts};
 
 /// The key of a channel's metadata under which QoS profiles stand.
 const QOS: &str = "offered_qos_profiles";
@@ -89,11 +88,13 @@ impl Topic {
     }
 
     /// `ros2msg`, `ros2idl` and others; empty without a schema.
+    #[must_use]
     pub fn schema_encoding(&self) -> &str {
         self.definition.as_ref().map_or("", |definition| &definition.encoding)
     }
 
     /// The schema's bytes; empty without one.
+    #[must_use]
     pub fn schema(&self) -> &[u8] {
         self.definition.as_ref().map_or(&[], |definition| &definition.data)
     }
@@ -107,6 +108,7 @@ impl Topic {
     ///
     /// # Errors
     /// [`BagError::Qos`] when the text is at fault.
+    #[must_use]
     pub fn offered_qos(&self) -> Option<Result<Vec<QosProfile>>> {
         self.metadata.get(QOS).map(|text| qos::from_yaml(text))
     }
@@ -128,6 +130,7 @@ impl Topic {
     }
 
     /// The type's name in full, where it is written without its middle part as in ROS 1.
+    #[must_use]
     pub fn full_type_name(&self) -> String {
         match self.type_name.split_once('/') {
             Some((package, name)) if !name.contains('/') => format!("{package}/msg/{name}"),

@@ -9,7 +9,7 @@ pub enum Value {
     Int(i128),
     Float(f64),
     Text(String),
-    List(Vec<Value>),
+    List(Vec<Self>),
 }
 
 /// A field of a message.

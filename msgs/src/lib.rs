@@ -69,28 +69,33 @@ pub struct Interface {
 
 impl Interface {
     /// The interface of a message type.
+    #[must_use]
     pub const fn of<M: RosMessage>() -> Self {
         Self { type_name: M::TYPE_NAME, type_hash: M::TYPE_HASH, schema: M::SCHEMA }
     }
 
     /// The interface with this full name, such as `std_msgs/msg/Header`, if it is one of ours.
+    #[must_use]
     pub fn find(type_name: &str) -> Option<&'static Self> {
         let index = MESSAGES.binary_search_by(|known| known.type_name.cmp(type_name)).ok()?;
         Some(&MESSAGES[index])
     }
 
     /// All message types, ordered by name.
+    #[must_use]
     pub fn all() -> &'static [Self] {
         MESSAGES
     }
 }
 
 /// Definition of a message type as bags store it, if it is one of ours.
+#[must_use]
 pub fn schema_for(type_name: &str) -> Option<&'static str> {
     Interface::find(type_name).map(|interface| interface.schema)
 }
 
 /// RIHS01 hash of a message type, if it is one of ours.
+#[must_use]
 pub fn type_hash_for(type_name: &str) -> Option<&'static str> {
     Interface::find(type_name).map(|interface| interface.type_hash)
 }

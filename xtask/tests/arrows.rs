@@ -109,6 +109,15 @@ fn no_files_import_each_other_in_a_circle() {
 }
 
 #[test]
+fn every_import_names_one_module() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let members = sources().into_iter().filter_map(|source| source.parent().map(Path::to_owned));
+    let folders = members.flat_map(|it| ["src", "tests", "examples", "benches", "build"].map(|name| it.join(name)));
+    let nested: Vec<_> = folders.chain([root.join("examples")]).flat_map(|it| imports::nested(&it)).collect();
+    assert!(nested.is_empty(), "write one `use` a module:\n{}", nested.join("\n"));
+}
+
+#[test]
 fn rooms_of_sim_know_only_what_the_architecture_allows() {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sim/src");
     let room = |file: &str| file.split_once('/').map_or(file.trim_end_matches(".rs"), |(room, _)| room).to_owned();

@@ -1,13 +1,16 @@
 //! Everything that reads a bag, on any bytes: `cargo +nightly fuzz run read_bag -- -max_total_time=600`
 #![no_main]
 
-use std::{fs, path::PathBuf, sync::OnceLock};
+use std::fs;
+use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use libfuzzer_sys::fuzz_target;
-use swath_bags::{
-    Bag, BagOptions, Filter,
-    ReadOptions, ops::{cat::cat, info::info, recover::recover, validate::validate},
-};
+use swath_bags::{Bag, BagOptions, Filter, ReadOptions};
+use swath_bags::ops::cat::cat;
+use swath_bags::ops::info::info;
+use swath_bags::ops::recover::recover;
+use swath_bags::ops::validate::validate;
 
 /// A folder in memory: the reader takes files.
 fn folder() -> &'static PathBuf {

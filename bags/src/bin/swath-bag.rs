@@ -1,13 +1,12 @@
 //! Record, play, inspect and mend rosbag2 bags.
 
-use std::{
-    env,
-    os::unix::process::CommandExt,
-    process::{self, ExitCode},
-};
+use std::env;
+use std::os::unix::process::CommandExt;
+use std::process::{self, ExitCode};
 
 use clap::{Args, Parser, Subcommand};
-use swath_bags::{chain, cli::Command, say};
+use swath_bags::cli::Command;
+use swath_bags::{chain, say};
 use swath_ros::RosArgs;
 
 /// Record, play, inspect and mend rosbag2 bags

@@ -1,20 +1,16 @@
 //! What several commands share: how bags are read, exit codes, output.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::{
-    error::{BagError, Result},
-    file::source::{MAX_RECORD_BYTES, ReadOptions},
-    out::{print, say},
-    qos::QosOverride,
-};
+use crate::error::{BagError, Result};
+use crate::file::source::{MAX_RECORD_BYTES, ReadOptions};
+use crate::out::{print, say};
+use crate::qos::QosOverride;
 
 /// The exit code of a command that has done its work, with loss.
 pub(super) const WITH_LOSS: u8 = 3;

@@ -1,15 +1,15 @@
 //! `convert` and `reindex`.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 
 use super::common::{ReadArgs, bags, done};
-use crate::{
-    error::Result,
-    ops::{convert::convert, reindex::reindex},
-    out::print,
-};
+use crate::error::Result;
+use crate::ops::convert::convert;
+use crate::ops::reindex::reindex;
+use crate::out::print;
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]

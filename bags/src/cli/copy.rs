@@ -1,21 +1,19 @@
 //! `filter`, `merge` and `recover`, and the arguments that select messages and shape new bags.
 
-use std::{path::PathBuf, process::ExitCode, time::Duration};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
 
 use super::common::{ReadArgs, WITH_LOSS, done, print_json};
-use crate::{
-    error::{BagError, Result},
-    file::chunk::Compression,
-    ops::{
-        copy::{Copied, filter, merge},
-        recover::recover,
-    },
-    out::print,
-    reader::{Bag, Filter, TopicPattern},
-    writer::{BagOptions, BagSummary},
-};
+use crate::error::{BagError, Result};
+use crate::file::chunk::Compression;
+use crate::ops::copy::{Copied, filter, merge};
+use crate::ops::recover::recover;
+use crate::out::print;
+use crate::reader::{Bag, Filter, TopicPattern};
+use crate::writer::{BagOptions, BagSummary};
 
 /// Which messages of a bag.
 #[derive(Debug, Args)]

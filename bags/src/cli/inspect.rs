@@ -1,23 +1,19 @@
 //! `info`, `cat` and `validate`.
 
-use std::{io, path::PathBuf, process::ExitCode};
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{
-    common::{ReadArgs, done, print_json},
-    copy::Selection,
-};
-use crate::{
-    error::Result,
-    ops::{
-        cat::cat,
-        info::{info, info_in_detail},
-        validate::validate,
-    },
-    out::print,
-    reader::Bag,
-};
+use super::common::{ReadArgs, done, print_json};
+use super::copy::Selection;
+use crate::error::Result;
+use crate::ops::cat::cat;
+use crate::ops::info::{info, info_in_detail};
+use crate::ops::validate::validate;
+use crate::out::print;
+use crate::reader::Bag;
 
 /// Arguments of `info`.
 #[derive(Debug, Args)]

@@ -8,7 +8,8 @@ mod play;
 mod record;
 mod signals;
 
-use std::{io, process::ExitCode};
+use std::io;
+use std::process::ExitCode;
 
 use clap::Subcommand;
 pub use record::{MANIFEST, MANIFEST_TEXT};

@@ -1,22 +1,20 @@
 //! `play`: a bag's messages onto a ROS 2 domain.
 
-use std::{path::PathBuf, process::ExitCode, time::Duration};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
 use swath_ros::RosArgs;
 
-use super::{
-    common::{ReadArgs, WITH_LOSS, bags, done, overrides, print_json},
-    copy::seconds,
-    signals::shutdown_on_signals,
-};
-use crate::{
-    error::{Result, chain},
-    out::say,
-    play::{End, LAST_MESSAGES, PlayOptions, Player},
-    reader::TopicPattern,
-};
+use super::common::{ReadArgs, WITH_LOSS, bags, done, overrides, print_json};
+use super::copy::seconds;
+use super::signals::shutdown_on_signals;
+use crate::error::{Result, chain};
+use crate::out::say;
+use crate::play::{End, LAST_MESSAGES, PlayOptions, Player};
+use crate::reader::TopicPattern;
 
 /// Arguments of `play`.
 #[derive(Debug, Args)]

@@ -1,33 +1,27 @@
 //! `record`: topics of a ROS 2 domain into a new bag.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-    process::ExitCode,
-    time::{SystemTime, UNIX_EPOCH},
-};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use chrono::DateTime;
 use clap::Args;
 use serde_json::{Value, json};
 use swath_ros::RosArgs;
 
-use super::{
-    common::{WITH_LOSS, overrides, print_json},
-    copy::Shape,
-    signals::shutdown_on_signals,
-};
-use crate::{
-    error::{BagError, Result},
-    file::chunk::Compression,
-    out::say,
-    preset::Preset,
-    reader::TopicPattern,
-    record::{RecordOptions, Recorder},
-    tap::{Discovery, Selection, TapClock},
-    writer::BagOptions,
-};
+use super::common::{WITH_LOSS, overrides, print_json};
+use super::copy::Shape;
+use super::signals::shutdown_on_signals;
+use crate::error::{BagError, Result};
+use crate::file::chunk::Compression;
+use crate::out::say;
+use crate::preset::Preset;
+use crate::reader::TopicPattern;
+use crate::record::{RecordOptions, Recorder};
+use crate::tap::{Discovery, Selection, TapClock};
+use crate::writer::BagOptions;
 
 /// The metadata record that tells of the mission: configuration, seed, planner, policy, revision.
 pub const MANIFEST: &str = "swath_manifest";

@@ -1,15 +1,11 @@
 //! Ctrl-C and SIGTERM for programs that must not be torn away from what they are closing.
 
-use std::{
-    process::exit,
-    thread,
-    time::{Duration, Instant},
-};
+use std::process::exit;
+use std::thread;
+use std::time::{Duration, Instant};
 
-use signal_hook::{
-    consts::{SIGINT, SIGTERM},
-    iterator::Signals,
-};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use swath_ros::{Shutdown, Signal};
 
 use crate::error::{BagError, Result};

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{parts::AttachmentRef, source::Source, walk::Place};
+use super::parts::AttachmentRef;
+use super::source::Source;
+use super::walk::Place;
 
 /// A file that was put into a bag beside the messages.
 #[derive(Debug, Clone)]

@@ -1,6 +1,8 @@
 //! Chunks: messages gathered in memory with their index, and their compressed form.
 
-use std::{io::Write, str::FromStr, time::Instant};
+use std::io::Write;
+use std::str::FromStr;
+use std::time::Instant;
 
 use mcap::records::{MessageHeader, op};
 
@@ -21,6 +23,7 @@ pub enum Compression {
 
 impl Compression {
     /// The name in MCAP's chunk records.
+    #[must_use]
     pub fn mcap_name(self) -> &'static str {
         match self {
             Self::None => "",

@@ -1,23 +1,17 @@
 //! The index of one file of a bag: topics, chunks and counts, from its summary or by a walk through it.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::Arc,
-};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
-use mcap::{
-    MAGIC,
-    records::{Channel, ChunkHeader, Metadata, Record, op},
-};
+use mcap::MAGIC;
+use mcap::records::{Channel, ChunkHeader, Metadata, Record, op};
 
-use super::{
-    parts::{AttachmentRef, ChunkRef, Kind, Schema},
-    record::{self, Records, misplaced},
-    source::Source,
-    storage::Storage,
-    unpack::Unpacker,
-    walk::{Place, Walk},
-};
+use super::parts::{AttachmentRef, ChunkRef, Kind, Schema};
+use super::record::{self, Records, misplaced};
+use super::source::Source;
+use super::storage::Storage;
+use super::unpack::Unpacker;
+use super::walk::{Place, Walk};
 use crate::error::Result;
 
 /// Messages of a run of loose records (outside chunks) that are read at a time [bytes].

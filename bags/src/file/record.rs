@@ -3,10 +3,8 @@
 use std::io::Cursor;
 
 use binrw::{BinRead, BinWrite};
-use mcap::{
-    McapError, parse_record,
-    records::{AttachmentHeader, MessageHeader, Record, op},
-};
+use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
+use mcap::{McapError, parse_record};
 
 /// Opcode and length.
 pub(crate) const PREFIX_LEN: usize = 9;

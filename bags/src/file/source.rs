@@ -1,13 +1,10 @@
 //! A file opened for reading: its bytes within checked bounds, and errors that name the offset.
 
-use std::{
-    fmt,
-    fs::File,
-    io,
-    os::unix::fs::FileExt,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::{fmt, io};
 
 use crate::error::{BagError, Result};
 

@@ -1,23 +1,19 @@
 //! rosbag2's SQLite files (`.db3`), read as if they were files of chunks.
 
-use std::{
-    collections::BTreeMap,
-    fmt,
-    fs::{self, File},
-    io::Read,
-    path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
-};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use mcap::records::{MessageHeader, op};
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::NamedTempFile;
 
-use super::{
-    parts::{ChunkRef, Kind, Rows},
-    record,
-    source::{ReadOptions, is_packed, unpack_into},
-};
+use super::parts::{ChunkRef, Kind, Rows};
+use super::record;
+use super::source::{ReadOptions, is_packed, unpack_into};
 use crate::error::{BagError, Result};
 
 /// The first bytes of a SQLite file.

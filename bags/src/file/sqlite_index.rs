@@ -1,16 +1,15 @@
 //! The index of rosbag2's SQLite files.
 
-use std::{path::Path, sync::Arc};
+use std::path::Path;
+use std::sync::Arc;
 
 use mcap::records::{Channel, Metadata};
 
-use super::{
-    index::FileIndex,
-    parts::Schema,
-    source::ReadOptions,
-    sqlite::{Sqlite, Tables},
-    storage::Storage,
-};
+use super::index::FileIndex;
+use super::parts::Schema;
+use super::source::ReadOptions;
+use super::sqlite::{Sqlite, Tables};
+use super::storage::Storage;
 use crate::error::Result;
 
 impl FileIndex {

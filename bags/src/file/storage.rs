@@ -1,8 +1,10 @@
 //! Where the bytes of a bag's file come from.
 
-use std::{path::Path, sync::Arc};
+use std::path::Path;
+use std::sync::Arc;
 
-use super::{source::Source, sqlite::Sqlite};
+use super::source::Source;
+use super::sqlite::Sqlite;
 use crate::error::BagError;
 
 /// Where the bytes of a file come from.

@@ -5,19 +5,15 @@
 
 use std::collections::BTreeSet;
 
-use mcap::{
-    MAGIC,
-    records::{ChunkIndex, Footer, Record, Statistics, op},
-};
+use mcap::MAGIC;
+use mcap::records::{ChunkIndex, Footer, Record, Statistics, op};
 
-use super::{
-    index::{FileIndex, load_chunk},
-    parts::{ChunkRef, Kind},
-    record::{self, PREFIX_LEN, Records},
-    source::Source,
-    unpack::Unpacker,
-    walk::{Place, Walk},
-};
+use super::index::{FileIndex, load_chunk};
+use super::parts::{ChunkRef, Kind};
+use super::record::{self, PREFIX_LEN, Records};
+use super::source::Source;
+use super::unpack::Unpacker;
+use super::walk::{Place, Walk};
 use crate::error::Result;
 
 /// Footer record and end magic.

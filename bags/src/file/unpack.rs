@@ -4,7 +4,8 @@ use std::io::Read;
 
 use mcap::records::ChunkHeader;
 
-use super::{source::Source, storage::Storage};
+use super::source::Source;
+use super::storage::Storage;
 use crate::error::Result;
 
 /// The first bytes of a Zstandard frame. No CDR begins so.

@@ -2,12 +2,11 @@
 //!
 //! The linear reader of the `mcap` crate reads every record whole, an attachment of gigabytes too.
 
-use mcap::{MAGIC, records::op};
+use mcap::MAGIC;
+use mcap::records::op;
 
-use super::{
-    record::{self, PREFIX_LEN},
-    source::Source,
-};
+use super::record::{self, PREFIX_LEN};
+use super::source::Source;
 use crate::error::Result;
 
 /// Bytes that are read at a time; small records lie close to each other.

@@ -1,20 +1,19 @@
 //! Writes one MCAP file in whole records, so that what is on disk can always be closed.
 
-use std::{collections::BTreeMap, fs::File, io, os::unix::fs::FileExt};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
 
-use mcap::{
-    MAGIC,
-    records::{
-        AttachmentIndex, Channel, ChunkHeader, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex,
-        SchemaHeader, Statistics, SummaryOffset, op,
-    },
+use mcap::MAGIC;
+use mcap::records::{
+    AttachmentIndex, Channel, ChunkHeader, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex, SchemaHeader,
+    Statistics, SummaryOffset, op,
 };
 
-use super::{
-    attachment::Attachment,
-    chunk::{Chunk, Compressor},
-    record,
-};
+use super::attachment::Attachment;
+use super::chunk::{Chunk, Compressor};
+use super::record;
 use crate::topic::Topic;
 
 /// Where a file's bytes go: positional writes, and cutting off what does not fit.

@@ -1,17 +1,13 @@
 //! Prints messages as JSON lines.
 
-use std::{
-    collections::BTreeMap,
-    io::{self, Write},
-};
+use std::collections::BTreeMap;
+use std::io::{self, Write};
 
 use super::note;
-use crate::{
-    error::{BagError, Result, chain},
-    reader::{Bag, BagTopic, Filter},
-    schema::{Schema, to_json},
-    topic::Topic,
-};
+use crate::error::{BagError, Result, chain};
+use crate::reader::{Bag, BagTopic, Filter};
+use crate::schema::{Schema, to_json};
+use crate::topic::Topic;
 
 /// Writes one JSON object a message: topic, type, time [s], `log_time_ns`, sequence, message.
 ///

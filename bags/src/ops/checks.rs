@@ -1,12 +1,10 @@
 //! What validation checks on each topic.
 
 use super::report::{Report, SHOWN, TopicReport};
-use crate::{
-    error::chain,
-    reader::{BagTopic, Message},
-    schema::{Schema, Visitor, decode},
-    topic::is_type_name,
-};
+use crate::error::chain;
+use crate::reader::{BagTopic, Message};
+use crate::schema::{Schema, Visitor, decode};
+use crate::topic::is_type_name;
 
 /// Checks the messages of one topic one after the other.
 pub(super) struct TopicCheck {

@@ -1,27 +1,24 @@
 //! Writes bags anew with other settings, as rosbag2's file of output options says.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use regex::Regex;
 use serde::Deserialize;
 use yaml_serde::{Mapping, Value};
 
 use super::copy::{Copied, Sequences, copy};
-use crate::{
-    error::{BagError, Result},
-    file::{chunk::Compression, source::ReadOptions},
-    preset::Preset,
-    qos::{QosOverride, QosProfile},
-    reader::{Bag, Filter, TopicPattern},
-    tap::is_hidden,
-    topic::Topic,
-    writer::BagOptions,
-};
+use crate::error::{BagError, Result};
+use crate::file::chunk::Compression;
+use crate::file::source::ReadOptions;
+use crate::preset::Preset;
+use crate::qos::{QosOverride, QosProfile};
+use crate::reader::{Bag, Filter, TopicPattern};
+use crate::tap::is_hidden;
+use crate::topic::Topic;
+use crate::writer::BagOptions;
 
 /// The option in error texts.
 const OPTION: &str = "--output-options";

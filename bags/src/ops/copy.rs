@@ -1,18 +1,14 @@
 //! Copies messages from bags into a new one: filtering and merging.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use super::note;
-use crate::{
-    error::{BagError, Result},
-    file::source::ReadOptions,
-    losses::{Losses, RECORDING},
-    reader::{Bag, Filter},
-    writer::{BagOptions, BagSummary, BagWriter, TopicId},
-};
+use crate::error::{BagError, Result};
+use crate::file::source::ReadOptions;
+use crate::losses::{Losses, RECORDING};
+use crate::reader::{Bag, Filter};
+use crate::writer::{BagOptions, BagSummary, BagWriter, TopicId};
 
 /// A new bag, and what of the old ones could not be read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

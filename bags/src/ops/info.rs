@@ -1,19 +1,15 @@
 //! What is in a bag, as `ros2 bag info` tells it, with the mission's facts.
 
-use std::{
-    collections::BTreeMap,
-    fmt::{self, Display, Formatter},
-};
+use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
 
 use chrono::DateTime;
 use serde::Serialize;
 
-use crate::{
-    error::Result,
-    losses::RECORDING,
-    qos::{self, QosProfile},
-    reader::{Bag, BagTopic, Filter},
-};
+use crate::error::Result;
+use crate::losses::RECORDING;
+use crate::qos::{self, QosProfile};
+use crate::reader::{Bag, BagTopic, Filter};
 
 /// Longest metadata value that is printed [characters].
 const VALUE_LEN: usize = 100;

@@ -1,27 +1,27 @@
 //! Saves what is whole in damaged or unclosed bags.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
 
 use mcap::records::{Metadata, op};
 
-use super::{copy::copy_metadata, note, validate::check_attachment};
-use crate::{
-    error::{BagError, Result},
-    file::{
-        attachment::Attachment,
-        index::{FileIndex, unpack},
-        record::{self, Records},
-        source::{ReadOptions, Source},
-        sqlite::is_sqlite,
-        storage::Storage,
-        unpack::{Unpacker, ZSTD_MAGIC},
-        walk::{Place, Walk},
-    },
-    qos::QosTexts,
-    reader::{Listing, Message, distinct},
-    topic::Topic,
-    writer::{BagOptions, BagSummary, BagWriter, TopicId},
-};
+use super::copy::copy_metadata;
+use super::note;
+use super::validate::check_attachment;
+use crate::error::{BagError, Result};
+use crate::file::attachment::Attachment;
+use crate::file::index::{FileIndex, unpack};
+use crate::file::record::{self, Records};
+use crate::file::source::{ReadOptions, Source};
+use crate::file::sqlite::is_sqlite;
+use crate::file::storage::Storage;
+use crate::file::unpack::{Unpacker, ZSTD_MAGIC};
+use crate::file::walk::{Place, Walk};
+use crate::qos::QosTexts;
+use crate::reader::{Listing, Message, distinct};
+use crate::topic::Topic;
+use crate::writer::{BagOptions, BagSummary, BagWriter, TopicId};
 
 /// What was saved, and what was not.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -1,13 +1,12 @@
 //! Writes a bag's `metadata.yaml` anew, from its files.
 
-use std::{collections::BTreeMap, path::Path};
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use crate::{
-    error::Result,
-    file::source::{ReadOptions, is_packed},
-    metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata},
-    reader::{Bag, BagFile},
-};
+use crate::error::Result;
+use crate::file::source::{ReadOptions, is_packed};
+use crate::metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata};
+use crate::reader::{Bag, BagFile};
 
 /// Reads the index of every bag file in a directory and writes `metadata.yaml`; what one told before of more than the
 /// files is kept. Returns what could not be read.

@@ -1,26 +1,23 @@
 //! Checks that a bag is what it should be, down to every message.
 
-use std::{collections::BTreeMap, path::Path};
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use mcap::{
-    MAGIC,
-    records::{Record, op},
-};
+use mcap::MAGIC;
+use mcap::records::{Record, op};
 
-use super::{checks::TopicCheck, note, report::Report};
-use crate::{
-    error::{BagError, Result, chain},
-    file::{
-        index::FileIndex,
-        parts::AttachmentRef,
-        record::{self, misplaced},
-        source::{ReadOptions, Source},
-        storage::Storage,
-        walk::Walk,
-    },
-    metadata::{BagInformation, FILE_NAME},
-    reader::{Bag, Filter, metadata_path},
-};
+use super::checks::TopicCheck;
+use super::note;
+use super::report::Report;
+use crate::error::{BagError, Result, chain};
+use crate::file::index::FileIndex;
+use crate::file::parts::AttachmentRef;
+use crate::file::record::{self, misplaced};
+use crate::file::source::{ReadOptions, Source};
+use crate::file::storage::Storage;
+use crate::file::walk::Walk;
+use crate::metadata::{BagInformation, FILE_NAME};
+use crate::reader::{Bag, Filter, metadata_path};
 
 /// The version of `metadata.yaml` from which on it has types' hashes.
 const HASH_SINCE: u32 = 7;

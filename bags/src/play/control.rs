@@ -8,8 +8,10 @@ use swath_msgs::rosbag2_interfaces::{
 };
 use swath_ros::{Node, RosError, Server, graph};
 
-use super::{engine::Engine, keys::Key};
-use crate::{error::Result, out::say};
+use super::engine::Engine;
+use super::keys::Key;
+use crate::error::Result;
+use crate::out::say;
 
 /// What a rate key multiplies by.
 const RATE_STEP: f64 = 1.1;

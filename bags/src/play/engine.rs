@@ -1,19 +1,18 @@
 //! What plays: the next message, its publisher, and when it is due.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    time::{Duration, Instant},
-};
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
 
-use swath_msgs::{builtin_interfaces::Time, rosgraph_msgs::Clock};
-use swath_ros::{Cdr, Publisher, RawPublisher, Shutdown, qos::SEND_TIMEOUT, stamp};
+use swath_msgs::builtin_interfaces::Time;
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_ros::qos::SEND_TIMEOUT;
+use swath_ros::{Cdr, Publisher, RawPublisher, Shutdown, stamp};
 
-use super::{lateness::Lateness, pace::Pace};
-use crate::{
-    error::{Result, chain},
-    reader::{Bag, Filter, Messages},
-    schema::{Schema, is_sendable, to_little_endian},
-};
+use super::lateness::Lateness;
+use super::pace::Pace;
+use crate::error::{Result, chain};
+use crate::reader::{Bag, Filter, Messages};
+use crate::schema::{Schema, is_sendable, to_little_endian};
 
 /// Publishers, and which of them a topic of the bag has.
 #[derive(Default)]

@@ -1,9 +1,7 @@
 //! Keys pressed in the terminal, without waiting for Enter.
 
-use std::{
-    io::{IsTerminal, Read},
-    sync::mpsc::{Receiver, channel},
-};
+use std::io::{IsTerminal, Read};
+use std::sync::mpsc::{Receiver, channel};
 
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 

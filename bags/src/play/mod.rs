@@ -6,27 +6,21 @@ mod keys;
 mod lateness;
 mod pace;
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::PathBuf,
-    time::{Duration, Instant},
-};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use swath_ros::{Node, RawPublisher, RosArgs, Shutdown, graph};
 
-use self::{
-    control::{Control, follow_key},
-    engine::{ClockPublisher, Engine, Outlets},
-    keys::Keys,
-    pace::Pace,
-};
-use crate::{
-    error::{BagError, Result, chain},
-    file::source::ReadOptions,
-    qos::{Durability, QosOverride, QosProfile},
-    reader::{Bag, BagTopic, Filter, TopicPattern},
-    ros_qos::to_ros,
-};
+use self::control::{Control, follow_key};
+use self::engine::{ClockPublisher, Engine, Outlets};
+use self::keys::Keys;
+use self::pace::Pace;
+use crate::error::{BagError, Result, chain};
+use crate::file::source::ReadOptions;
+use crate::qos::{Durability, QosOverride, QosProfile};
+use crate::reader::{Bag, BagTopic, Filter, TopicPattern};
+use crate::ros_qos::to_ros;
 
 /// The topic of simulated time.
 const CLOCK: &str = "/clock";
@@ -135,6 +129,7 @@ impl Player {
     }
 
     /// The node's signal, for [`Shutdown::on_signals`].
+    #[must_use]
     pub fn signal(&self) -> &swath_ros::Signal {
         self.node.signal()
     }

@@ -1,16 +1,12 @@
 //! Which files a bag consists of: those that its information lists, or else those that lie there.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
 
-use crate::{
-    error::{BagError, Result, chain},
-    file::source::unpacked_name,
-    metadata::{self, BagInformation},
-};
+use crate::error::{BagError, Result, chain};
+use crate::file::source::unpacked_name;
+use crate::metadata::{self, BagInformation};
 
 /// A bag's files, before any of them is opened.
 #[derive(Debug, Default)]

@@ -1,19 +1,17 @@
 //! Messages of a bag in order of log time, with bounded memory.
 
-use std::{cmp::Reverse, collections::BinaryHeap};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 use mcap::records::op;
 
-use super::{Bag, select::Filter};
-use crate::{
-    error::Result,
-    file::{
-        index::FileIndex,
-        parts::ChunkRef,
-        record::{self, PREFIX_LEN, Records},
-        unpack::{Unpacker, ZSTD_MAGIC},
-    },
-};
+use super::Bag;
+use super::select::Filter;
+use crate::error::Result;
+use crate::file::index::FileIndex;
+use crate::file::parts::ChunkRef;
+use crate::file::record::{self, PREFIX_LEN, Records};
+use crate::file::unpack::{Unpacker, ZSTD_MAGIC};
 
 /// Unpacked chunks that are kept at a time [bytes]; beyond it the ones needed last are dropped
 /// and read again when their turn comes.

@@ -5,11 +5,9 @@ mod messages;
 mod select;
 mod topic;
 
-use std::{
-    collections::{BTreeMap, HashMap},
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 pub(crate) use files::{Listing, metadata_path};
 use mcap::records::Metadata;
@@ -17,20 +15,16 @@ pub use messages::{Message, Messages};
 pub use select::{Filter, TopicPattern};
 pub use topic::BagTopic;
 
-use crate::{
-    error::{BagError, Result, chain},
-    file::{
-        attachment::Attachment,
-        index::FileIndex,
-        source::{ReadOptions, Source},
-        sqlite::is_sqlite,
-        storage::Storage,
-    },
-    losses::{Losses, RECORDING},
-    metadata::BagInformation,
-    qos::QosTexts,
-    topic::{Topic, TopicKey},
-};
+use crate::error::{BagError, Result, chain};
+use crate::file::attachment::Attachment;
+use crate::file::index::FileIndex;
+use crate::file::source::{ReadOptions, Source};
+use crate::file::sqlite::is_sqlite;
+use crate::file::storage::Storage;
+use crate::losses::{Losses, RECORDING};
+use crate::metadata::BagInformation;
+use crate::qos::QosTexts;
+use crate::topic::{Topic, TopicKey};
 
 /// The metadata record in which rosbag2 repeats a file's information.
 const ROSBAG2: &str = "rosbag2";
@@ -208,11 +202,13 @@ impl Bag {
     }
 
     /// The path as given to [`open`](Self::open).
+    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// What of the bag could not be read: files that are missing or damaged, information that makes no sense.
+    #[must_use]
     pub fn faults(&self) -> &[String] {
         &self.faults
     }
@@ -220,6 +216,7 @@ impl Bag {
     /// Topics in order of name; messages refer to them by index.
     ///
     /// A name stands more than once where its type, schema or metadata differ.
+    #[must_use]
     pub fn topics(&self) -> &[BagTopic] {
         &self.topics
     }
@@ -230,6 +227,7 @@ impl Bag {
     }
 
     /// Files in order of time.
+    #[must_use]
     pub fn files(&self) -> Vec<BagFile> {
         let describe = |file: &FileIndex| BagFile {
             path: file.storage.path().to_owned(),
@@ -254,17 +252,20 @@ impl Bag {
     }
 
     /// Messages in all files.
+    #[must_use]
     pub fn message_count(&self) -> u64 {
         self.topics.iter().fold(0, |sum, topic| sum.saturating_add(topic.messages))
     }
 
     /// Earliest and latest log time [ns]; `None` without messages.
+    #[must_use]
     pub fn time_range(&self) -> Option<(u64, u64)> {
         let chunks = || self.files.iter().flat_map(|f| &f.chunks);
         Some((chunks().map(|c| c.start).min()?, chunks().map(|c| c.end).max()?))
     }
 
     /// The profile that all files have which have one; empty when they differ.
+    #[must_use]
     pub fn profile(&self) -> &str {
         let mut profiles = self.files.iter().map(|file| file.profile.as_str()).filter(|profile| !profile.is_empty());
         let first = profiles.next().unwrap_or_default();
@@ -272,17 +273,20 @@ impl Bag {
     }
 
     /// Metadata records of all files in order; what every file of a bag repeats counts once.
+    #[must_use]
     pub fn metadata(&self) -> Vec<(String, BTreeMap<String, String>)> {
         distinct(self.files.iter().map(|file| &file.metadata[..]))
     }
 
     /// The first metadata record of a name.
+    #[must_use]
     pub fn metadata_named(&self, name: &str) -> Option<&BTreeMap<String, String>> {
         let mut all = self.files.iter().flat_map(|f| &f.metadata);
         all.find(|m| m.name == name).map(|m| &m.metadata)
     }
 
     /// Attachments of all files.
+    #[must_use]
     pub fn attachments(&self) -> Vec<Attachment> {
         let mut attachments = Vec::new();
         for file in &self.files {
@@ -293,6 +297,7 @@ impl Bag {
     }
 
     /// Messages that were to be in the bag and are not, as its recording told.
+    #[must_use]
     pub fn losses(&self) -> Losses {
         let mut losses = Losses::default();
         for (name, pairs) in self.metadata() {
@@ -304,6 +309,7 @@ impl Bag {
     }
 
     /// `metadata.yaml`, or what a single file of rosbag2 says in its place, but for the topics: see [`topics`](Self::topics).
+    #[must_use]
     pub fn information(&self) -> Option<&BagInformation> {
         self.information.as_ref()
     }

@@ -48,6 +48,7 @@ impl TopicPattern {
     }
 
     /// Whether a topic is selected.
+    #[must_use]
     pub fn selects(&self, topic: &str) -> bool {
         let all = self.names.is_empty() && self.regex.is_none();
         let named = self.names.iter().any(|name| name == topic);
@@ -57,6 +58,7 @@ impl TopicPattern {
     }
 
     /// The names given one by one.
+    #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
     }

@@ -1,6 +1,8 @@
 //! A topic of an open bag.
 
-use crate::{error::Result, schema, topic::Topic};
+use crate::error::Result;
+use crate::schema;
+use crate::topic::Topic;
 
 /// A topic of an open bag.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,20 +2,16 @@
 
 use std::time::{Duration, Instant};
 
-use swath_msgs::{
-    builtin_interfaces::Time,
-    diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue},
-    rosbag2_interfaces::{
-        IsPaused, IsPausedResponse, Pause, Resume, Snapshot, SnapshotResponse, SplitBagfile, Stop, TogglePaused,
-    },
-    std_msgs::Header,
+use swath_msgs::builtin_interfaces::Time;
+use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use swath_msgs::rosbag2_interfaces::{
+    IsPaused, IsPausedResponse, Pause, Resume, Snapshot, SnapshotResponse, SplitBagfile, Stop, TogglePaused,
 };
+use swath_msgs::std_msgs::Header;
 use swath_ros::{Node, Publisher, RosError, Server, graph};
 
-use crate::{
-    error::{Result, chain},
-    writer::{BagSummary, BagWriter},
-};
+use crate::error::{Result, chain};
+use crate::writer::{BagSummary, BagWriter};
 
 /// How often diagnostics are sent while nothing changes [wall time].
 const REPORT_EVERY: Duration = Duration::from_secs(5);
@@ -102,7 +98,9 @@ impl Control {
         if let Err(error) = self.send(level, text, &[], stamp) {
             tracing::warn!("no last diagnostics: {error}");
         }
-        self.diagnostics.flush(Duration::from_millis(500));
+        if !self.diagnostics.flush(Duration::from_millis(500)) {
+            tracing::debug!("not every reader has the last diagnostics");
+        }
         if level != DiagnosticStatus::OK {
             // A reader may drop what it has not taken yet when the writer leaves.
             std::thread::sleep(Duration::from_millis(500));

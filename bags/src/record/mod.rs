@@ -3,21 +3,17 @@
 mod control;
 mod sink;
 
-use std::{
-    collections::BTreeMap,
-    path::PathBuf,
-    time::{Duration, Instant},
-};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 pub use sink::BagSink;
 use swath_ros::{Node, RosArgs, Shutdown, graph};
 
 use self::control::{Control, Wishes};
-use crate::{
-    error::{BagError, Result},
-    tap::{Selection, Tap},
-    writer::{BagOptions, BagSummary, BagWriter, Counter},
-};
+use crate::error::{BagError, Result};
+use crate::tap::{Selection, Tap};
+use crate::writer::{BagOptions, BagSummary, BagWriter, Counter};
 
 /// How long messages gather before they are taken, so that a wake-up serves many [wall time].
 const BATCH: Duration = Duration::from_millis(4);

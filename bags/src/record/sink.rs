@@ -1,11 +1,9 @@
 //! The bag as a sink of the tap.
 
-use crate::{
-    error::Result,
-    tap::{Sink, Tapped},
-    topic::Topic,
-    writer::{BagSummary, BagWriter, TopicId},
-};
+use crate::error::Result;
+use crate::tap::{Sink, Tapped};
+use crate::topic::Topic;
+use crate::writer::{BagSummary, BagWriter, TopicId};
 
 /// Writes what comes out of the tap into a bag.
 pub struct BagSink {
@@ -18,11 +16,13 @@ pub struct BagSink {
 
 impl BagSink {
     /// A sink into a new bag.
+    #[must_use]
     pub fn new(writer: BagWriter) -> Self {
         Self { writer, topics: Vec::new(), paused: false }
     }
 
     /// The bag's writer.
+    #[must_use]
     pub fn writer(&self) -> &BagWriter {
         &self.writer
     }

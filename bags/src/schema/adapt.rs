@@ -1,6 +1,7 @@
 //! Brings messages that were recorded with one version of a type into another version of it.
 
-use super::{Count, Element, Primitive, Scalar, Schema, Visitor, decode, decode::HEADER};
+use super::decode::HEADER;
+use super::{Count, Element, Primitive, Scalar, Schema, Visitor, decode};
 use crate::error::{BagError, Result};
 
 /// A message recorded as `recorded` says, as little-endian CDR of version 1 of the type as `wanted` says.

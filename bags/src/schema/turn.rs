@@ -1,9 +1,7 @@
 //! Brings CDR of every byte order and version into the one that is sent by DDS here: little-endian, version 1.
 
-use super::{
-    Schema,
-    decode::{HEADER, numbers},
-};
+use super::Schema;
+use super::decode::{HEADER, numbers};
 use crate::error::Result;
 
 /// Whether a message is little-endian CDR of version 1, by its encapsulation header.

@@ -1,9 +1,7 @@
 //! A message type with all types that it is made of.
 
-use crate::{
-    error::{BagError, Result},
-    topic::Topic,
-};
+use crate::error::{BagError, Result};
+use crate::topic::Topic;
 
 /// A type that fits one CDR value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,25 +4,19 @@ mod source;
 mod stamp;
 mod timeline;
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    time::{Duration, Instant},
-};
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
 
 use swath_ros::{Node, graph};
 pub use timeline::TapClock;
 
-use self::{
-    source::{Source, Taken},
-    timeline::{Timeline, Times},
-};
-use crate::{
-    error::{Result, chain},
-    qos::{History, QosOverride, QosProfile},
-    reader::TopicPattern,
-    ros_qos,
-    topic::Topic,
-};
+use self::source::{Source, Taken};
+use self::timeline::{Timeline, Times};
+use crate::error::{Result, chain};
+use crate::qos::{History, QosOverride, QosProfile};
+use crate::reader::TopicPattern;
+use crate::ros_qos;
+use crate::topic::Topic;
 
 /// How long after a match the other side may still not send [wall time].
 const SETTLING: Duration = Duration::from_millis(300);
@@ -134,6 +128,7 @@ impl Tap {
     }
 
     /// The node that listens.
+    #[must_use]
     pub fn node(&self) -> &Node {
         &self.node
     }
@@ -144,6 +139,7 @@ impl Tap {
     }
 
     /// The latest time that the tap's clock has shown [ns].
+    #[must_use]
     pub fn now(&self) -> Option<u64> {
         self.timeline.now()
     }

@@ -3,7 +3,9 @@
 use swath_ros::{RawSample, RawSubscription, graph};
 
 use super::stamp::StampPlace;
-use crate::{error::Result, schema::Schema, topic::Topic};
+use crate::error::Result;
+use crate::schema::Schema;
+use crate::topic::Topic;
 
 /// Messages that are taken from one topic before the others have their turn.
 const TURN: usize = 8192;

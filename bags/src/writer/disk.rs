@@ -1,29 +1,21 @@
 //! The writer's thread: files of a bag, their splitting, their end, and a full disk.
 
-use std::{
-    collections::BTreeMap,
-    fs::{self, File},
-    io,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use mcap::records::Metadata;
 
-use super::{
-    options::{BagOptions, BagSummary},
-    queue::{Job, Shared},
-};
-use crate::{
-    error::{BagError, Result},
-    file::{
-        chunk::{Chunk, Compressor},
-        writer::{Disk, FileSummary, FileWriter, TopicIds},
-    },
-    losses::{Losses, RECORDING},
-    metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata},
-    topic::Topic,
-};
+use super::options::{BagOptions, BagSummary};
+use super::queue::{Job, Shared};
+use crate::error::{BagError, Result};
+use crate::file::chunk::{Chunk, Compressor};
+use crate::file::writer::{Disk, FileSummary, FileWriter, TopicIds};
+use crate::losses::{Losses, RECORDING};
+use crate::metadata::{self, BagInformation, FileInformation, Nanoseconds, SinceEpoch, TopicCount, TopicMetadata};
+use crate::topic::Topic;
 
 /// Opens the file that a path names; tests put limits on it.
 pub(super) type OpenDisk = Box<dyn Fn(&Path) -> io::Result<Box<dyn Disk>> + Send>;
@@ -306,7 +298,8 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     use super::*;
-    use crate::{Bag, BagWriter, Compression, Filter, qos::QosProfile};
+    use crate::qos::QosProfile;
+    use crate::{Bag, BagWriter, Compression, Filter};
 
     /// A disk with room for so many bytes, shared by all its files.
     struct SmallDisk {

@@ -4,26 +4,24 @@ mod disk;
 mod options;
 mod queue;
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-    sync::{Arc, Condvar, Mutex, PoisonError},
-    thread::JoinHandle,
-};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
 
 use mcap::records::{MessageHeader, Metadata};
 pub use options::{BagOptions, BagSummary};
 pub use queue::TopicId;
 use queue::{Job, QUEUE_CHUNKS, Shared, State, TopicState};
 
-use crate::{
-    error::{BagError, Result},
-    file::{attachment::Attachment, chunk::Compressor, writer::TopicIds},
-    losses::Losses,
-    reader::Message,
-    topic::Topic,
-};
+use crate::error::{BagError, Result};
+use crate::file::attachment::Attachment;
+use crate::file::chunk::Compressor;
+use crate::file::writer::TopicIds;
+use crate::losses::Losses;
+use crate::reader::Message;
+use crate::topic::Topic;
 
 /// A bag being written: `<dir>/<dir's name>_0.mcap` and on, and `<dir>/metadata.yaml`.
 ///
@@ -72,6 +70,7 @@ impl BagWriter {
     }
 
     /// The bag directory.
+    #[must_use]
     pub fn dir(&self) -> &Path {
         &self.dir
     }
@@ -232,17 +231,20 @@ impl BagWriter {
     }
 
     /// A count of the messages written, which other threads may watch.
+    #[must_use]
     pub fn counter(&self) -> Counter {
         Counter { shared: Arc::clone(&self.shared) }
     }
 
     /// Messages counted as lost so far.
+    #[must_use]
     pub fn lost(&self) -> u64 {
         let state = self.shared.lock();
         state.carried.total() + state.topics.iter().map(|t| t.lost).sum::<u64>()
     }
 
     /// Whether storing has failed, so that further messages are refused.
+    #[must_use]
     pub fn has_stopped(&self) -> bool {
         self.shared.lock().stopped
     }
@@ -278,6 +280,7 @@ pub struct Counter {
 
 impl Counter {
     /// Messages so far, those lost included.
+    #[must_use]
     pub fn messages(&self) -> u64 {
         self.shared.lock().written
     }

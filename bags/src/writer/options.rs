@@ -1,6 +1,7 @@
 //! How a bag is written, and what has been written.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
+use std::time::Duration;
 
 use crate::file::chunk::Compression;
 

@@ -1,19 +1,17 @@
 //! What waits between whoever writes a bag and the thread that stores it.
 
-use std::{
-    collections::{HashMap, VecDeque},
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
-    time::Duration,
-};
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use mcap::records::Metadata;
 
 use super::options::BagOptions;
-use crate::{
-    file::{attachment::Attachment, chunk::Chunk, writer::TopicIds},
-    losses::Losses,
-    topic::{Definition, Topic, TopicKey},
-};
+use crate::file::attachment::Attachment;
+use crate::file::chunk::Chunk;
+use crate::file::writer::TopicIds;
+use crate::losses::Losses;
+use crate::topic::{Definition, Topic, TopicKey};
 
 /// Finished chunks that may wait for the disk before `write` blocks.
 pub(super) const QUEUE_CHUNKS: usize = 32;

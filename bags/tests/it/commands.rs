@@ -1,12 +1,12 @@
 //! The commands as processes: what they print and how they exit.
 
-use std::{
-    os::unix::fs::PermissionsExt,
-    path::Path,
-    process::{Command, Output, Stdio},
-};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
 
-use swath_bags::{Bag, BagOptions, metadata::BagInformation, qos::Durability};
+use swath_bags::metadata::BagInformation;
+use swath_bags::qos::Durability;
+use swath_bags::{Bag, BagOptions};
 
 use crate::common::{cdr, state, write_sample};
 

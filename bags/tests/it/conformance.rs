@@ -1,23 +1,20 @@
 //! MCAP's public conformance suite: 416 files, each told, printed, filtered and recovered as it is, and read alike by
 //! the reader of the `mcap` crate.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
-use swath_bags::{
-    Bag, BagOptions, Compression, Filter, ReadOptions,
-    ops::{cat::cat, copy::filter, info::info, recover::recover},
-};
+use swath_bags::ops::cat::cat;
+use swath_bags::ops::copy::filter;
+use swath_bags::ops::info::info;
+use swath_bags::ops::recover::recover;
+use swath_bags::{Bag, BagOptions, Compression, Filter, ReadOptions};
 
-use crate::common::{
-    conformance::{File, files},
-    contents::{defined, found},
-};
+use crate::common::conformance::{File, files};
+use crate::common::contents::{defined, found};
 
 /// Chunks that the `mcap` crate reads without its features.
 fn plain() -> BagOptions {

@@ -1,11 +1,11 @@
 //! Truncated, bit-flipped and foreign files: errors that name offset and reason, never a panic.
 
-use std::{fs, path::Path};
+use std::fs;
+use std::path::Path;
 
-use swath_bags::{
-    Bag, BagError, BagOptions, Compression, Filter, ReadOptions,
-    ops::{recover::recover, validate::validate},
-};
+use swath_bags::ops::recover::recover;
+use swath_bags::ops::validate::validate;
+use swath_bags::{Bag, BagError, BagOptions, Compression, Filter, ReadOptions};
 
 use crate::common::write_sample;
 

@@ -1,27 +1,23 @@
 //! Bags of others: what rosbag2 of every version, other writers of MCAP, and accidents leave.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use serde_json::{Value, json};
-use swath_bags::{
-    Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
-    metadata::BagInformation,
-    ops::{
-        cat::cat,
-        copy::{Copied, filter, merge},
-        info::{info, info_in_detail},
-        recover::recover,
-        validate::validate,
-    },
-    qos::{Durability, QosProfile},
-};
-use swath_msgs::{rosgraph_msgs::Clock, std_msgs::Header};
+use swath_bags::metadata::BagInformation;
+use swath_bags::ops::cat::cat;
+use swath_bags::ops::copy::{Copied, filter, merge};
+use swath_bags::ops::info::{info, info_in_detail};
+use swath_bags::ops::recover::recover;
+use swath_bags::ops::validate::validate;
+use swath_bags::qos::{Durability, QosProfile};
+use swath_bags::{Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern};
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_msgs::std_msgs::Header;
 
-use crate::common::{cdr, contents::found, run_python, topic};
+use crate::common::contents::found;
+use crate::common::{cdr, run_python, topic};
 
 /// The start of most of these bags [ns].
 const START: u64 = 1_700_000_000_000_000_000;

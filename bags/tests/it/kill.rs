@@ -1,25 +1,20 @@
 //! A killed writer, or recorder, loses no more than the last second.
 
-use std::{
-    env,
-    fs::{self, File},
-    os::unix::fs::FileExt,
-    path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
-    thread::sleep,
-    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
-};
+use std::env;
+use std::fs::{self, File};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use swath_bags::{
-    Bag, BagOptions, BagWriter, ReadOptions, Topic,
-    ops::{recover::recover, validate::validate},
-};
+use swath_bags::ops::recover::recover;
+use swath_bags::ops::validate::validate;
+use swath_bags::{Bag, BagOptions, BagWriter, ReadOptions, Topic};
 use swath_ros::graph;
 
-use crate::common::{
-    program::{Program, node, wait_until},
-    state,
-};
+use crate::common::program::{Program, node, wait_until};
+use crate::common::state;
 
 /// Where the child writes its bag; without it the child's part is no test.
 const BAG: &str = "SWATH_TEST_KILLED_BAG";

@@ -1,18 +1,16 @@
 //! Filtering, merging, recovering, validating and printing bags, as library calls.
 
-use std::{fs, path::Path, time::Duration};
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
 
-use swath_bags::{
-    Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern,
-    ops::{
-        cat::cat,
-        copy::{filter, merge},
-        info::info,
-        recover::recover,
-        validate::validate,
-    },
-    qos::QosProfile,
-};
+use swath_bags::ops::cat::cat;
+use swath_bags::ops::copy::{filter, merge};
+use swath_bags::ops::info::info;
+use swath_bags::ops::recover::recover;
+use swath_bags::ops::validate::validate;
+use swath_bags::qos::QosProfile;
+use swath_bags::{Bag, BagError, BagOptions, BagWriter, Compression, Filter, ReadOptions, Topic, TopicPattern};
 use swath_msgs::swath_msgs::SpacecraftState;
 
 use crate::common::{TICK, cdr, state, topic, write_sample};

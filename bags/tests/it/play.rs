@@ -1,31 +1,23 @@
 //! The player as a process, with subscriptions around it.
 
-use std::{
-    fs::{self, File},
-    path::Path,
-    process::{Command, Stdio},
-};
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Command, Stdio};
 
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use swath_bags::{Bag, BagOptions, BagWriter, Filter, qos::QosProfile as BagQos};
-use swath_msgs::{
-    rosbag2_interfaces::{
-        Burst, BurstRequest, GetRate, IsPaused, PlayNext, Resume, Seek, SeekRequest, SetRate, SetRateRequest, Stop,
-        TogglePaused,
-    },
-    rosgraph_msgs::Clock,
-    swath_msgs::SpacecraftState,
+use swath_bags::qos::QosProfile as BagQos;
+use swath_bags::{Bag, BagOptions, BagWriter, Filter};
+use swath_msgs::rosbag2_interfaces::{
+    Burst, BurstRequest, GetRate, IsPaused, PlayNext, Resume, Seek, SeekRequest, SetRate, SetRateRequest, Stop,
+    TogglePaused,
 };
-use swath_ros::{
-    Environment, Mapping, Node, RawSample, RawSubscription, RosArgs, Subscription, graph,
-    qos::{Durability, History, QosProfile},
-};
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_msgs::swath_msgs::SpacecraftState;
+use swath_ros::qos::{Durability, History, QosProfile};
+use swath_ros::{Environment, Mapping, Node, RawSample, RawSubscription, RosArgs, Subscription, graph};
 
-use crate::common::{
-    TICK, cdr,
-    program::{PATIENCE, Program, call, client, node, wait_until},
-    stamp, state, topic, write_sample,
-};
+use crate::common::program::{PATIENCE, Program, call, client, node, wait_until};
+use crate::common::{TICK, cdr, stamp, state, topic, write_sample};
 
 const TICKS: u64 = 400;
 const STATES: &str = "/swath/state";

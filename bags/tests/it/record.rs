@@ -1,37 +1,26 @@
 //! The recorder as a process, with publishers around it.
 
-use std::{
-    fs,
-    path::Path,
-    process::Command,
-    time::{Duration, Instant},
-};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
 
-use swath_bags::{
-    Bag, Filter, ReadOptions, Topic, TopicPattern,
-    ops::validate::validate,
-    tap::{Selection, Sink, Tap, Tapped},
-};
-use swath_msgs::{
-    RosMessage,
-    diagnostic_msgs::{DiagnosticArray, DiagnosticStatus},
-    geometry_msgs::{Transform, TransformStamped},
-    rosbag2_interfaces::{IsPaused, Pause, Resume, SplitBagfile, Stop},
-    rosgraph_msgs::Clock,
-    std_msgs::Header,
-    swath_msgs::UpcomingStrips,
-    tf2_msgs::TFMessage,
-};
-use swath_ros::{
-    Cdr, Environment, Mapping, Node, RosArgs, Subscription, graph,
-    qos::{History, QosProfile, WhenFull},
-};
+use swath_bags::ops::validate::validate;
+use swath_bags::tap::{Selection, Sink, Tap, Tapped};
+use swath_bags::{Bag, Filter, ReadOptions, Topic, TopicPattern};
+use swath_msgs::RosMessage;
+use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use swath_msgs::geometry_msgs::{Transform, TransformStamped};
+use swath_msgs::rosbag2_interfaces::{IsPaused, Pause, Resume, SplitBagfile, Stop};
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_msgs::std_msgs::Header;
+use swath_msgs::swath_msgs::UpcomingStrips;
+use swath_msgs::tf2_msgs::TFMessage;
+use swath_ros::qos::{History, QosProfile, WhenFull};
+use swath_ros::{Cdr, Environment, Mapping, Node, RosArgs, Subscription, graph};
 
-use crate::common::{
-    TICK, cdr,
-    program::{PATIENCE, Program, call, client, node, wait_until},
-    stamp, state,
-};
+use crate::common::program::{PATIENCE, Program, call, client, node, wait_until};
+use crate::common::{TICK, cdr, stamp, state};
 
 /// A recorder that is ready; its bag is `dir/bag`.
 fn recorder(domain: u16, dir: &Path, words: &[&str]) -> Program {
@@ -144,11 +133,11 @@ fn stamps_far_from_the_clock_are_given_the_clock_s_time() {
     let wall = 1_800_000_000_000_000_000;
     for (now, stamped) in [(100, 100 * TICK), (101, wall), (102, 102 * TICK), (103, 0)] {
         clock.publish(&Clock { clock: stamp(now * TICK) }).unwrap();
-        clock.flush(PATIENCE);
+        assert!(clock.flush(PATIENCE));
         std::thread::sleep(Duration::from_millis(100));
         let header = Header { stamp: stamp(stamped), ..Header::default() };
         headers.publish(Cdr::from_bytes(cdr(&header))).unwrap();
-        headers.flush(PATIENCE);
+        assert!(headers.flush(PATIENCE));
         std::thread::sleep(Duration::from_millis(100));
     }
     assert!(recorder.interrupt().0.success());
@@ -165,7 +154,7 @@ fn a_second_signal_does_not_keep_the_bag_from_being_closed() {
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     wait_until("the recorder listens", || states.matched() > 0);
     (1..=50).for_each(|tick| states.publish(&state(tick)).unwrap());
-    states.flush(PATIENCE);
+    assert!(states.flush(PATIENCE));
     let (status, closed) = recorder.signalled(&["-INT", "-INT", "-TERM", "-INT"]);
     assert!(status.success(), "{status}");
     assert_eq!(closed.unwrap()["messages"], 50);
@@ -203,7 +192,7 @@ fn the_options_of_ros2_bag_record() {
     assert_eq!((late.matched(), early[1].matched(), early[2].matched(), early[3].matched()), (0, 0, 0, 0));
     let header = Cdr::from_bytes(cdr(&Header { stamp: stamp(TICK), ..Header::default() }));
     early[0].publish(header).unwrap();
-    early[0].flush(PATIENCE);
+    assert!(early[0].flush(PATIENCE));
     assert!(recorder.interrupt().0.success());
     let bag = Bag::open(&temp.path().join("bag")).unwrap();
     assert_eq!(times(&bag, "/early"), [TICK]);

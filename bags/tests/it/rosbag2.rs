@@ -1,16 +1,13 @@
 //! All test bags of rosbag2, from a clone of its repository.
 
-use std::{
-    env, fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs};
 
 use serde_json::Value;
-use swath_bags::{
-    Bag, BagOptions, Filter, ReadOptions,
-    ops::{copy::filter, validate::validate},
-};
+use swath_bags::ops::copy::filter;
+use swath_bags::ops::validate::validate;
+use swath_bags::{Bag, BagOptions, Filter, ReadOptions};
 
 use crate::common::python;
 

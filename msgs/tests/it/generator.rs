@@ -1,11 +1,8 @@
 //! The generator: what it reads, what it refuses, and the hashes it computes.
 
-use crate::{
-    describe::{self, Catalogue},
-    emit,
-    model::{Base, Primitive, Shape, Value},
-    parse,
-};
+use crate::describe::{self, Catalogue};
+use crate::model::{Base, Primitive, Shape, Value};
+use crate::{emit, parse};
 
 fn catalogue(files: &[(&str, &str, &str)]) -> Catalogue {
     files

@@ -145,8 +145,8 @@ fn fly(node: &Node, warm_up: u64, ticks: u64) -> Outcome<Report> {
     }
     expect_torque(node, &torques, warm_up + ticks - 1)?;
     let (wall_s, cpu_s) = (began.elapsed().as_secs_f64(), cpu_s() - cpu_before);
-    clock.flush(PATIENCE);
-    states.flush(PATIENCE);
+    assert!(clock.flush(PATIENCE));
+    assert!(states.flush(PATIENCE));
     Ok(Report { ticks_per_s: ticks as f64 / wall_s, cpu_s, lost: torques.lost(), ..Default::default() })
 }
 
@@ -171,7 +171,7 @@ fn command(node: &Node, warm_up: u64, ticks: u64) -> Outcome<Report> {
         torques.publish(&WheelTorque { tick: state.tick, header: state.header, ..Default::default() })?;
     }
     let cpu_s = cpu_s() - cpu_before;
-    torques.flush(PATIENCE);
+    assert!(torques.flush(PATIENCE));
     until_input_ends();
     Ok(Report { cpu_s, lost: states.lost(), ..Default::default() })
 }

@@ -48,6 +48,9 @@ enum Scope {
 impl RosArgs {
     /// Takes the words between `--ros-args` and `--` (or the end) out of a command line, and
     /// returns the rest, for the program's own parser, with what they say.
+    ///
+    /// # Errors
+    /// [`RosError::Argument`] for a word that is not understood, [`RosError::ParameterFile`] for a file that cannot be used.
     pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), RosError> {
         let mut rest = Vec::new();
         let mut args = Self::default();
@@ -147,6 +150,9 @@ impl RosArgs {
     }
 
     /// The names of the node that the program calls `name` and puts into `namespace`.
+    ///
+    /// # Errors
+    /// [`RosError::Name`] when the name or the namespace breaks the rules of ROS.
     pub fn names(&self, namespace: &str, name: &str) -> Result<Names, RosError> {
         let mine: Vec<&Remap> =
             self.remaps.iter().filter(|rule| rule.node.as_deref().is_none_or(|n| n == name)).collect();
@@ -166,6 +172,7 @@ impl RosArgs {
     }
 
     /// The values given to parameters of a node; of several for one name, the last.
+    #[must_use]
     pub fn overrides(&self, names: &Names) -> BTreeMap<String, Value> {
         self.overrides
             .iter()
@@ -185,6 +192,7 @@ impl RosArgs {
     }
 
     /// The least severe level that a node logs.
+    #[must_use]
     pub fn log_level_of(&self, names: &Names) -> Level {
         let dotted = names.fully_qualified().trim_start_matches('/').replace('/', ".");
         self.log_levels
@@ -195,6 +203,7 @@ impl RosArgs {
     }
 
     /// Whether log lines go to `/rosout`.
+    #[must_use]
     pub fn rosout(&self) -> bool {
         !self.rosout_off
     }

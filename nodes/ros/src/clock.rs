@@ -18,17 +18,20 @@ impl SimClock {
     }
 
     /// Simulated time [ns since the mission epoch].
+    #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.nanoseconds.load(Ordering::Relaxed)
     }
 
     /// Simulated time as messages carry it.
+    #[must_use]
     pub fn stamp(&self) -> Time {
         stamp(self.now_ns())
     }
 }
 
 /// A time [ns since the mission epoch] as messages carry it; beyond 2^31 s it stands still.
+#[must_use]
 pub fn stamp(nanoseconds: u64) -> Time {
     let (sec, nanosec) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
     Time { sec: i32::try_from(sec).unwrap_or(i32::MAX), nanosec: nanosec as u32 }

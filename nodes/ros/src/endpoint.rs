@@ -86,6 +86,7 @@ impl RawPublisher {
     }
 
     /// Waits until every reliable reader has all samples, and tells whether that is so.
+    #[must_use]
     pub fn flush(&self, timeout: Duration) -> bool {
         self.slot.flush(timeout)
     }
@@ -96,16 +97,19 @@ impl RawPublisher {
     }
 
     /// Readers that this writer sends to.
+    #[must_use]
     pub fn matched(&self) -> usize {
         self.roster.matched(self.gid()).len()
     }
 
     /// Fully qualified name of the topic.
+    #[must_use]
     pub fn topic(&self) -> &str {
         &self.topic
     }
 
     /// The writer's identity; another one after RustDDS has been started anew.
+    #[must_use]
     pub fn gid(&self) -> Gid {
         self.slot.gid()
     }
@@ -137,6 +141,9 @@ impl RawSubscription {
     ///
     /// Once it has returned nothing, the next sample to come raises the node's [`Signal`]. Samples of an unknown
     /// encoding are passed over and counted (`Node::notices`).
+    ///
+    /// # Errors
+    /// When DDS fails.
     pub fn take(&self) -> Result<Option<RawSample>, RosError> {
         // A node that reads many topics asks them all whenever one has news: this makes it cheap.
         if self.bell.is_quiet() {

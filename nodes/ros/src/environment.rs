@@ -15,6 +15,7 @@ pub enum Mapping {
 
 impl Mapping {
     /// The mapping that the nodes around use, by the value of `RMW_IMPLEMENTATION`.
+    #[must_use]
     pub fn for_middleware(rmw_implementation: Option<&str>) -> Self {
         match rmw_implementation {
             Some(name) if name.contains("fastrtps") || name.contains("connext") => Self::Enhanced,
@@ -40,6 +41,9 @@ const DOMAIN_MAX: u16 = 232;
 
 impl Environment {
     /// Reads the environment of the process.
+    ///
+    /// # Errors
+    /// [`RosError::Environment`] for a variable with a value that it cannot have.
     pub fn read() -> Result<Self, RosError> {
         Self::from(|name| std::env::var(name).ok())
     }

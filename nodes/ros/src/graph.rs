@@ -78,6 +78,7 @@ pub struct Service<S> {
 
 impl<M: RosMessage> Topic<M> {
     /// A topic that is not in the table, such as one of a test.
+    #[must_use]
     pub const fn new(
         name: &'static str,
         profile: Profile,
@@ -91,6 +92,7 @@ impl<M: RosMessage> Topic<M> {
 
 impl<S: RosService> Service<S> {
     /// A service that is not in the table, such as one of a test.
+    #[must_use]
     pub const fn new(name: &'static str, writers: &'static [&'static str], readers: &'static [&'static str]) -> Self {
         let profile = Profile::Service;
         let entry = Entry { name, type_name: S::TYPE_NAME, profile, writers, readers };
@@ -230,6 +232,7 @@ pub const SERVICES: &[Entry] = &[
 ];
 
 /// The table as a Mermaid flow chart: nodes are boxes, topics are arrows between them.
+#[must_use]
 pub fn mermaid() -> String {
     let mut chart = "flowchart LR\n".to_owned();
     for node in FLIGHT_NODES.iter().chain(&[LAUNCHER, OPERATOR, RECORDER]) {
@@ -257,6 +260,7 @@ fn pairs(entry: &Entry) -> impl Iterator<Item = (&'static str, &'static str)> {
 }
 
 /// The table in Markdown.
+#[must_use]
 pub fn table() -> String {
     let mut table = "| topic | type | profile | written by | read by |\n| --- | --- | --- | --- | --- |\n".to_owned();
     for entry in TOPICS.iter().chain(SERVICES) {

@@ -10,11 +10,17 @@ use crate::cdr::{Cdr, header_with_room};
 use crate::error::RosError;
 
 /// Writes a message as little-endian CDR, encapsulation header included.
+///
+/// # Errors
+/// [`RosError::Encode`] when the message cannot be written, such as a sequence of more than 2^32 elements.
 pub fn encode<M: RosMessage>(message: &M) -> Result<Cdr, RosError> {
     encode_as(M::TYPE_NAME, message)
 }
 
 /// Reads a message from CDR bytes, encapsulation header included.
+///
+/// # Errors
+/// [`RosError::Decode`] when the bytes are no such message.
 pub fn decode<M: RosMessage>(cdr: &Cdr) -> Result<M, RosError> {
     decode_as(M::TYPE_NAME, cdr)
 }

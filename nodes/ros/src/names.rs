@@ -14,6 +14,9 @@ pub struct Names {
 impl Names {
     /// Names of the node `name` in `namespace` (absolute, `/` for none), which renames topics and
     /// services by `remaps`, pairs of names before and after; the first that matches counts.
+    ///
+    /// # Errors
+    /// [`RosError::Name`] for a name that breaks the rules of ROS.
     pub fn new(namespace: &str, name: &str, remaps: &[(String, String)]) -> Result<Self, RosError> {
         let absolute = format!("/{}", namespace.trim_matches('/'));
         if absolute != "/" {
@@ -31,21 +34,27 @@ impl Names {
     }
 
     /// The namespace, absolute.
+    #[must_use]
     pub fn namespace(&self) -> &str {
         self.node.namespace()
     }
 
     /// The name within the namespace.
+    #[must_use]
     pub fn name(&self) -> &str {
         self.node.base_name()
     }
 
     /// Namespace and name, such as `/swath/spacecraft`.
+    #[must_use]
     pub fn fully_qualified(&self) -> String {
         self.node.fully_qualified_name()
     }
 
     /// The name that a topic or service really has, after expansion and remapping.
+    ///
+    /// # Errors
+    /// [`RosError::Name`] when the name breaks the rules of ROS.
     pub fn resolve(&self, name: &str) -> Result<String, RosError> {
         let expanded = self.expand(name)?;
         let renamed = self.remaps.iter().find(|(from, _)| *from == expanded);

@@ -79,6 +79,9 @@ impl Node {
     }
 
     /// As [`Self::start`], in an environment of the caller's choice.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
     pub fn start_in(environment: Environment, name: &str, args: &RosArgs) -> Result<Self, RosError> {
         let names = args.names(graph::NAMESPACE, name)?;
         let parameters = Parameters::new(args, &names);
@@ -161,6 +164,9 @@ impl Node {
     }
 
     /// A writer of a topic.
+    ///
+    /// # Errors
+    /// When the topic's name breaks the rules of ROS, or DDS fails.
     pub fn publisher<M: RosMessage>(&self, topic: &graph::Topic<M>) -> Result<Publisher<M>, RosError> {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_publisher(name, type_name, &profile.qos())?;
@@ -169,11 +175,17 @@ impl Node {
     }
 
     /// A reader of a topic, with the depth of the topic's profile.
+    ///
+    /// # Errors
+    /// When the topic's name breaks the rules of ROS, or DDS fails.
     pub fn subscription<M: RosMessage>(&self, topic: &graph::Topic<M>) -> Result<Subscription<M>, RosError> {
         self.subscription_with_depth(topic, topic.entry.profile.depth())
     }
 
     /// A reader that keeps up to `depth` messages until they are taken.
+    ///
+    /// # Errors
+    /// When the topic's name breaks the rules of ROS, or DDS fails.
     pub fn subscription_with_depth<M: RosMessage>(
         &self,
         topic: &graph::Topic<M>,
@@ -187,6 +199,9 @@ impl Node {
 
     /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
+    ///
+    /// # Errors
+    /// When the name breaks the rules of ROS, or DDS fails.
     pub fn raw_publisher(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawPublisher, RosError> {
         let topic = self.names.resolve(name)?;
         self.writer(topic.clone(), &dds_topic(&topic), type_name, qos)
@@ -194,12 +209,18 @@ impl Node {
 
     /// A reader of CDR bytes from the topic `name` (relative, absolute or private) of the type
     /// `type_name` (such as `std_msgs/msg/Header`).
+    ///
+    /// # Errors
+    /// When the name breaks the rules of ROS, or DDS fails.
     pub fn raw_subscription(&self, name: &str, type_name: &str, qos: &QosProfile) -> Result<RawSubscription, RosError> {
         let topic = self.names.resolve(name)?;
         self.reader(topic.clone(), &dds_topic(&topic), type_name, qos)
     }
 
     /// A server of a service.
+    ///
+    /// # Errors
+    /// When the service's name breaks the rules of ROS, or DDS fails.
     pub fn server<S: RosService>(&self, service: &graph::Service<S>) -> Result<Server<S>, RosError> {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
@@ -210,6 +231,9 @@ impl Node {
     }
 
     /// A client of a service.
+    ///
+    /// # Errors
+    /// When the service's name breaks the rules of ROS, or DDS fails.
     pub fn client<S: RosService>(&self, service: &graph::Service<S>) -> Result<Client<S>, RosError> {
         let name = self.names.resolve(service.entry.name)?;
         let (request_topic, response_topic) = dds_service(&name);
@@ -271,6 +295,7 @@ impl Node {
 
     /// What went wrong with the messages of others since this was last called: each kind on each topic at most once
     /// in five seconds, with how often it happened. Nothing of it is a reason to stop.
+    #[must_use]
     pub fn notices(&self) -> Vec<Notice> {
         self.roster.notices.take(Instant::now())
     }
@@ -294,6 +319,9 @@ impl Node {
     }
 
     /// Waits until a server of the client's service is there.
+    ///
+    /// # Errors
+    /// [`RosError::MissingPeers`] when there is none in time.
     pub fn wait_for_service<S: RosService>(&self, client: &Client<S>, timeout: Duration) -> Result<(), RosError> {
         if !self.roster.wait_until(Instant::now() + timeout, || client.matched()) {
             let missing = vec![format!("nobody serves {}", client.service())];
@@ -304,36 +332,43 @@ impl Node {
     }
 
     /// Fully qualified names of the nodes of the other processes in the domain.
+    #[must_use]
     pub fn nodes(&self) -> BTreeSet<String> {
         self.roster.nodes()
     }
 
     /// The topic writers of the other processes in the domain.
+    #[must_use]
     pub fn remote_writers(&self) -> Vec<RemoteWriter> {
         remote_writers(&self.dds.participant())
     }
 
     /// The parameters of this node.
+    #[must_use]
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
 
     /// Simulated time as this node knows it; the node's logic sets it.
+    #[must_use]
     pub fn clock(&self) -> &SimClock {
         &self.clock
     }
 
     /// The signal that this node's subscriptions raise.
+    #[must_use]
     pub fn signal(&self) -> &Signal {
         &self.signal
     }
 
     /// The names of this node.
+    #[must_use]
     pub fn names(&self) -> &Names {
         &self.names
     }
 
     /// The DDS domain, network and middleware.
+    #[must_use]
     pub fn environment(&self) -> &Environment {
         &self.environment
     }

@@ -32,6 +32,7 @@ pub enum Trouble {
 
 impl Trouble {
     /// Name for alarms.
+    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unreadable => "unreadable messages",

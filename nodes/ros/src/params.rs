@@ -105,6 +105,9 @@ impl Parameters {
     ///
     /// To be called once all parameters are declared. Values in parameter files may be meant for
     /// others and are not checked.
+    ///
+    /// # Errors
+    /// [`RosError::Parameter`] for the first such value, with the names that there are.
     pub fn check_given(&self) -> Result<(), RosError> {
         let store = lock(&self.shared);
         match store.addressed.iter().find(|name| !store.declared.contains_key(*name)) {
@@ -120,16 +123,21 @@ impl Parameters {
     }
 
     /// The value of a parameter, if it is declared with this type.
+    #[must_use]
     pub fn get<T: Typed>(&self, name: &str) -> Option<T> {
         lock(&self.shared).declared.get(name).and_then(|declared| T::from_value(&declared.value))
     }
 
     /// A number that grows with every change.
+    #[must_use]
     pub fn revision(&self) -> u64 {
         lock(&self.shared).revision
     }
 
     /// Sets a parameter as a ROS user would.
+    ///
+    /// # Errors
+    /// [`RosError::Parameter`] when there is none of this name, or it cannot have the value.
     pub fn set(&self, name: &str, value: Value) -> Result<(), RosError> {
         self.set_all(vec![(name.to_owned(), value)])
     }
@@ -159,11 +167,13 @@ impl Parameters {
     }
 
     /// Names of the declared parameters.
+    #[must_use]
     pub fn names(&self) -> Vec<String> {
         lock(&self.shared).declared.keys().cloned().collect()
     }
 
     /// The value of a parameter, of whatever type.
+    #[must_use]
     pub fn value(&self, name: &str) -> Option<Value> {
         lock(&self.shared).declared.get(name).map(|declared| declared.value.clone())
     }

@@ -27,6 +27,7 @@ pub enum Profile {
 
 impl Profile {
     /// Name for diagrams and people.
+    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::State => "state",
@@ -40,6 +41,7 @@ impl Profile {
     }
 
     /// Samples that a reader keeps until they are taken. One that comes on top pushes out the oldest.
+    #[must_use]
     pub const fn depth(self) -> usize {
         match self {
             Self::State => 64,
@@ -53,6 +55,7 @@ impl Profile {
     }
 
     /// The profile as ROS 2 has it.
+    #[must_use]
     pub const fn qos(self) -> QosProfile {
         let durability = match self {
             Self::Latched | Self::Log => Durability::TransientLocal,

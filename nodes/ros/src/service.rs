@@ -115,6 +115,9 @@ impl<S: RosService> Server<S> {
     /// Once it has returned nothing, the next request to come raises the node's [`Signal`].
     ///
     /// Bytes that are no such request are passed over and counted (`Node::notices`).
+    ///
+    /// # Errors
+    /// When DDS fails.
     pub fn take(&self) -> Result<Option<(RequestId, S::Request)>, RosError> {
         while let Some(sample) = self.requests.take()? {
             match self.mapping.unwrap(&sample, sample.info.writer) {
@@ -128,12 +131,18 @@ impl<S: RosService> Server<S> {
     /// Answers a request.
     ///
     /// The response is sent when the client's reader is matched, or after two seconds.
+    ///
+    /// # Errors
+    /// When the response cannot be encoded, or DDS fails.
     pub fn respond(&self, id: RequestId, response: S::Response) -> Result<(), RosError> {
         let cdr = self.mapping.wrap(id, response)?;
         self.responses.send(Reply::new(id.process, cdr, self.mapping.beside(id)))
     }
 
     /// Answers all requests that have come, and returns how many.
+    ///
+    /// # Errors
+    /// When a response cannot be encoded, or DDS fails.
     pub fn answer_all(&self, mut answer: impl FnMut(S::Request) -> S::Response) -> Result<usize, RosError> {
         let mut answered = 0;
         while let Some((id, request)) = self.take()? {
@@ -173,6 +182,9 @@ impl<S: RosService> Client<S> {
     }
 
     /// Sends a request, and returns the id that its response will have.
+    ///
+    /// # Errors
+    /// When the request cannot be encoded, or DDS fails.
     pub fn send(&self, request: S::Request) -> Result<RequestId, RosError> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
         let id = RequestId::new(self.requests.gid(), number);
@@ -185,6 +197,9 @@ impl<S: RosService> Client<S> {
     }
 
     /// The next response to a request of this client, if there is one.
+    ///
+    /// # Errors
+    /// When DDS fails.
     pub fn take(&self) -> Result<Option<(RequestId, S::Response)>, RosError> {
         let own = self.requests.gid();
         while let Some(sample) = self.responses.take()? {

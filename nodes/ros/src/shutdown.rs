@@ -31,6 +31,9 @@ pub struct Shutdown {
 impl Shutdown {
     /// Watches for Ctrl-C and SIGTERM, which raise `signal` too. One that comes more than a second later ends the
     /// process.
+    ///
+    /// # Errors
+    /// [`RosError::System`] when signals cannot be watched.
     pub fn on_signals(signal: &Signal) -> Result<Self, RosError> {
         let shutdown = Self::default();
         let mut signals = Signals::new([SIGINT, SIGTERM])
@@ -54,6 +57,7 @@ impl Shutdown {
     }
 
     /// Whether the process was asked to end.
+    #[must_use]
     pub fn asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }

@@ -39,6 +39,7 @@ impl Shared {
 
 impl Signal {
     /// A flag that is not raised.
+    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
@@ -56,6 +57,7 @@ impl Signal {
     /// The thread sleeps at once: with six busy threads on two cores, looking again and again
     /// before sleeping made the loop of `examples/bench_ros.rs` no faster and cost half as much
     /// processor time again.
+    #[expect(clippy::must_use_candidate, reason = "who waits for news looks for them itself")]
     pub fn wait(&self, timeout: Duration) -> bool {
         if self.lower() {
             return true;
@@ -79,6 +81,7 @@ impl Signal {
     ///
     /// For those who need not be quick and read much: waking a thread for each sample costs more
     /// than taking it.
+    #[expect(clippy::must_use_candidate, reason = "who waits for news looks for them itself")]
     pub fn wait_gathering(&self, gather: Duration, timeout: Duration) -> bool {
         let raised = self.wait(timeout);
         if raised {
@@ -89,6 +92,7 @@ impl Signal {
     }
 
     /// A waker that raises the flag.
+    #[must_use]
     pub fn waker(&self) -> Waker {
         Waker::from(Arc::clone(&self.shared))
     }

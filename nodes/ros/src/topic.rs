@@ -35,21 +35,25 @@ impl<M: RosMessage> Publisher<M> {
     }
 
     /// Waits until every reliable reader has all messages, and tells whether that is so.
+    #[must_use]
     pub fn flush(&self, timeout: Duration) -> bool {
         self.raw.flush(timeout)
     }
 
     /// Readers that this writer sends to.
+    #[must_use]
     pub fn matched(&self) -> usize {
         self.raw.matched()
     }
 
     /// Fully qualified name of the topic.
+    #[must_use]
     pub fn topic(&self) -> &str {
         self.raw.topic()
     }
 
     /// The writer's identity.
+    #[must_use]
     pub fn gid(&self) -> Gid {
         self.raw.gid()
     }
@@ -181,6 +185,9 @@ impl<M: RosMessage> Subscription<M> {
     /// Waits for the next message, and returns nothing when the time is over.
     ///
     /// It waits for the signal of this subscription, and so sees any news that raise it.
+    ///
+    /// # Errors
+    /// When DDS fails.
     pub fn wait(&self, signal: &Signal, timeout: Duration) -> Result<Option<M>, RosError> {
         let deadline = Instant::now() + timeout;
         loop {

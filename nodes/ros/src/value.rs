@@ -28,6 +28,7 @@ pub enum Value {
 
 impl Value {
     /// Name of the type, for people.
+    #[must_use]
     pub const fn type_name(&self) -> &'static str {
         match self {
             Self::Bool(_) => "bool",
@@ -43,6 +44,7 @@ impl Value {
     }
 
     /// One of the [`ParameterType`] constants.
+    #[must_use]
     pub const fn type_code(&self) -> u8 {
         match self {
             Self::Bool(_) => ParameterType::PARAMETER_BOOL,
@@ -58,6 +60,9 @@ impl Value {
     }
 
     /// The value of a YAML scalar or list.
+    ///
+    /// # Errors
+    /// A text that says why it is no value of a parameter.
     pub fn from_yaml(yaml: &Yaml) -> Result<Self, String> {
         match yaml {
             Yaml::Bool(value) => Ok(Self::Bool(*value)),
@@ -74,6 +79,9 @@ impl Value {
     }
 
     /// The value written as text, as after `-p name:=`.
+    ///
+    /// # Errors
+    /// A text that says why it is no value of a parameter.
     pub fn from_text(text: &str) -> Result<Self, String> {
         let yaml: Yaml = yaml_serde::from_str(text).map_err(|error| error.to_string())?;
         Self::from_yaml(&yaml)

@@ -340,6 +340,7 @@ impl Entry {
     }
 
     /// Windows that close after `now`.
+    #[must_use]
     pub fn windows_after(&self, now: Tick) -> &[Window] {
         let closed = self.windows.partition_point(|window| window.close <= now);
         &self.windows[closed..]

@@ -60,6 +60,40 @@ pub fn circles(arrows: &Arrows) -> Vec<Vec<String>> {
     circles.into_iter().collect()
 }
 
+/// The imports in a folder's files that reach into several modules at once; rustfmt's stable settings let them pass.
+pub fn nested(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).into_iter().flatten() {
+        let path = entry.unwrap_or_else(|error| panic!("{}: {error}", folder.display())).path();
+        if path.is_dir() {
+            found.extend(nested(&path));
+        } else if path.extension().is_some_and(|it| it == "rs") {
+            let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            let parsed = syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            let mut nests = Nests::default();
+            nests.visit_file(&parsed);
+            found.extend(nests.found.iter().map(|it| format!("{}: {it}", path.display())));
+        }
+    }
+    found
+}
+
+/// Collects imports whose braces hold paths.
+#[derive(Default)]
+struct Nests {
+    found: Vec<String>,
+}
+
+impl<'ast> Visit<'ast> for Nests {
+    fn visit_use_group(&mut self, group: &'ast syn::UseGroup) {
+        self.found.extend(group.items.iter().filter_map(|tree| match tree {
+            UseTree::Path(it) => Some(format!("{}::", it.ident)),
+            _ => None,
+        }));
+        visit::visit_use_group(self, group);
+    }
+}
+
 fn reached<'a>(arrows: &'a Arrows, from: &'a String) -> BTreeSet<&'a String> {
     let mut all = BTreeSet::new();
     let mut open = vec![from];

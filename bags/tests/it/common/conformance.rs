@@ -5,15 +5,14 @@
 #![allow(dead_code, reason = "each user uses some of these")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
-use std::{collections::BTreeMap, io::Cursor};
+use std::collections::BTreeMap;
+use std::io::Cursor;
 
 use binrw::BinWrite;
-use mcap::{
-    MAGIC,
-    records::{
-        AttachmentHeader, AttachmentIndex, Channel, ChunkHeader, ChunkIndex, DataEnd, Footer, Header, MessageHeader,
-        MessageIndex, MessageIndexEntry, Metadata, MetadataIndex, SchemaHeader, Statistics, SummaryOffset, op,
-    },
+use mcap::MAGIC;
+use mcap::records::{
+    AttachmentHeader, AttachmentIndex, Channel, ChunkHeader, ChunkIndex, DataEnd, Footer, Header, MessageHeader,
+    MessageIndex, MessageIndexEntry, Metadata, MetadataIndex, SchemaHeader, Statistics, SummaryOffset, op,
 };
 
 /// The features by the names that the suite's file names have, in their order there.

@@ -4,10 +4,8 @@
 
 use std::collections::BTreeMap;
 
-use mcap::{
-    read::ChunkFlattener,
-    records::{AttachmentHeader, Record},
-};
+use mcap::read::ChunkFlattener;
+use mcap::records::{AttachmentHeader, Record};
 use swath_bags::RECORDING;
 
 use super::conformance::Content;

@@ -7,16 +7,17 @@ pub mod contents;
 pub mod mutate;
 pub mod program;
 
-use std::{
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use swath_bags::{BagOptions, BagSummary, BagWriter, Topic, qos::QosProfile};
-use swath_msgs::{
-    RosMessage, builtin_interfaces::Time, diagnostic_msgs::DiagnosticArray, rosgraph_msgs::Clock, std_msgs::Header,
-    swath_msgs::SpacecraftState, swath_msgs::UpcomingStrips,
-};
+use swath_bags::qos::QosProfile;
+use swath_bags::{BagOptions, BagSummary, BagWriter, Topic};
+use swath_msgs::RosMessage;
+use swath_msgs::builtin_interfaces::Time;
+use swath_msgs::diagnostic_msgs::DiagnosticArray;
+use swath_msgs::rosgraph_msgs::Clock;
+use swath_msgs::std_msgs::Header;
+use swath_msgs::swath_msgs::{SpacecraftState, UpcomingStrips};
 
 /// A message's little-endian CDR with its encapsulation header.
 pub fn cdr<M: RosMessage>(message: &M) -> Vec<u8> {

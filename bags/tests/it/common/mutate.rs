@@ -2,15 +2,19 @@
 #![allow(dead_code, reason = "each user uses some of these")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
-use std::{fs, io::sink, path::Path};
+use std::fs;
+use std::io::sink;
+use std::path::Path;
 
 use mcap::records::op;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use swath_bags::{
-    Bag, BagOptions, Filter, ReadOptions,
-    ops::{cat::cat, copy::filter, info::info, recover::recover, validate::validate_open},
-};
+use swath_bags::ops::cat::cat;
+use swath_bags::ops::copy::filter;
+use swath_bags::ops::info::info;
+use swath_bags::ops::recover::recover;
+use swath_bags::ops::validate::validate_open;
+use swath_bags::{Bag, BagOptions, Filter, ReadOptions};
 
 /// Values that lengths, counts and times go wrong at.
 const EDGES: [u64; 14] = [

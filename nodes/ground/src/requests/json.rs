@@ -16,16 +16,19 @@ pub fn state_name(number: u8) -> &'static str {
 }
 
 /// A time, or a dash without one.
+#[must_use]
 pub fn time(time: &Time) -> String {
     if *time == Time::default() { "-".to_owned() } else { time_text::format(nanoseconds(time)) }
 }
 
 /// A time, or null without one.
+#[must_use]
 pub fn time_json(at: &Time) -> Value {
     if *at == Time::default() { Value::Null } else { time(at).into() }
 }
 
 /// Where a request stands, for machines.
+#[must_use]
 pub fn status_json(status: &msg::StripStatus) -> Value {
     let strip = &status.strip;
     json!({
@@ -56,6 +59,7 @@ pub fn status_json(status: &msg::StripStatus) -> Value {
 }
 
 /// An order as a GeoJSON feature, with all of its conditions, where it stands and what it went through.
+#[must_use]
 pub fn exported(order: &Order, status: &msg::StripStatus, history: Vec<Value>) -> Value {
     let mut feature = feature_of(order);
     if let (Value::Object(properties), Value::Object(standing)) = (&mut feature["properties"], status_json(status)) {
@@ -68,6 +72,7 @@ pub fn exported(order: &Order, status: &msg::StripStatus, history: Vec<Value>) -
 }
 
 /// A line of the audit trail, for machines.
+#[must_use]
 pub fn history_json(entry: &msg::HistoryEntry) -> Value {
     json!({
         "sequence": entry.sequence,

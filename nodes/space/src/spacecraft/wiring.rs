@@ -194,8 +194,10 @@ impl SpacecraftNode {
     }
 
     fn linger(&self) -> Result<()> {
-        self.states.flush(FLUSH_TIMEOUT);
-        self.clock.flush(FLUSH_TIMEOUT);
+        let (states, clock) = (self.states.flush(FLUSH_TIMEOUT), self.clock.flush(FLUSH_TIMEOUT));
+        if !(states && clock) {
+            tracing::warn!("not every reader has the last state and time");
+        }
         while !self.base.shutdown.asked() {
             self.base.node.wait(FLUSH_TIMEOUT)?;
             // The last state is the one that ends the mission: it must arrive.

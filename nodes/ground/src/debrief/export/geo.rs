@@ -13,12 +13,18 @@ use crate::debrief::recorded::Recorded;
 use crate::requests::json::status_json;
 
 /// Each strip with where it stands at the end.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn write_strips(recorded: &Recorded, folder: &Path) -> Result<()> {
     let feature = |event: &&msg::StripStatus| feature(&strip_places(&recorded.model, &event.strip), status_json(event));
     write(folder, "strips.geojson", recorded.last_events().values().map(feature).collect())
 }
 
 /// The points below the satellite.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn write_ground_track(track: &Track, name: &str, folder: &Path) -> Result<()> {
     let places: Vec<Place> = track.points.iter().map(|point| point.place).collect();
     let ends = |point: Option<&super::track::TrackPoint>| point.map(|point| point.time_s);
