@@ -1,4 +1,4 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|chaos|wheel|soak|ament`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|chaos|wheel|web|soak|ament`.
 
 mod ament;
 mod bench;
@@ -9,6 +9,7 @@ mod prerequisites;
 mod process;
 mod soak;
 mod venv;
+mod web;
 mod wheel;
 
 use std::ffi::OsString;
@@ -40,6 +41,8 @@ usage: cargo xtask COMMAND
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
+  web              test and build the console's page with npm, from its sources into
+                   the files that the program holds
   ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
                    in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
   soak python      run the Python package's long examples; they fetch gigabytes
@@ -70,6 +73,7 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("wheel") => wheel(&root, rest),
         Some("chaos") => chaos(&root, rest),
         Some("soak") => soak(&root, rest),
+        Some("web") => web(&root, rest),
         Some("ament") => ament(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
@@ -180,6 +184,13 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
     }
     setup(root, true)?;
     soak::run(root, args)
+}
+
+fn web(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("web takes no arguments\n\n{USAGE}");
+    }
+    web::build(root)
 }
 
 fn ament(root: &Path, args: &[OsString]) -> Result<()> {
