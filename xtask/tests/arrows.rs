@@ -23,6 +23,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-node", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission"]),
     ("swath-space", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-node"]),
     ("swath-ground", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
+    ("swath-console", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
     (
         "swath-nodes",
         &[
@@ -34,6 +35,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "swath-node",
             "swath-space",
             "swath-ground",
+            "swath-console",
             "swath-training",
         ],
     ),
@@ -52,6 +54,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-node", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-ground", &["tch", "torch-sys"]),
+    ("swath-console", &["tch", "torch-sys", "parquet", "plotters"]),
     ("xtask", &["tch", "torch-sys", "ros2-client", "rustdds"]),
 ];
 
