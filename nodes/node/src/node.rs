@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
@@ -10,6 +11,7 @@ use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
 
+use crate::error::MessageError;
 use crate::out;
 use crate::program::{MISSION, Program};
 use crate::stamp::Stamper;
@@ -66,12 +68,34 @@ impl MissionNode {
         Ok(Self {
             shutdown,
             horizon: mission.horizon(&model),
-            stamper: Stamper::new(mission.epoch_unix_s, model.period),
+            stamper: Stamper::new(mission.epoch_unix_s, model.period).in_namespace(node.names().namespace()),
             model,
             mission,
             diagnostics,
             node,
         })
+    }
+
+    /// Waits for news, and tells whether there are any; what went wrong with the messages of others is an alarm.
+    ///
+    /// # Errors
+    /// When the node may not go on, or an alarm cannot be sent.
+    pub fn wait(&self, timeout: Duration) -> Result<bool> {
+        for notice in self.node.notices() {
+            self.alarm(Severity::Warn, notice.trouble.name(), &notice.to_string())?;
+        }
+        Ok(self.node.wait(timeout)?)
+    }
+
+    /// A tick of this mission.
+    ///
+    /// # Errors
+    /// When it lies after the mission's end.
+    pub fn tick(&self, tick: u64) -> Result<Tick, MessageError> {
+        if tick > self.horizon.0 {
+            return Err(MessageError::Tick { tick, end: self.horizon.0 });
+        }
+        Ok(Tick(tick))
     }
 
     /// Sets this node's idea of simulated time.

@@ -321,7 +321,10 @@ impl Roster {
     /// Counts a message that does not count.
     pub(crate) fn note_stranger(&self, writer: Gid, topic: &str) {
         let text = || "their writer does not belong to the mission, they do not count".to_owned();
-        self.notices.note(Trouble::Stranger, topic, text);
+        // On topics of the whole domain others have their say.
+        if topic.starts_with(&format!("{}/", self.names.namespace().trim_end_matches('/'))) {
+            self.notices.note(Trouble::Stranger, topic, text);
+        }
         let mut state = lock(&self.state);
         let count = state.strangers.entry(writer).or_default();
         *count += 1;

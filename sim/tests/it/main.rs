@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod regress_ground;
+mod regress_learners;
 mod regress_missions;
 mod regress_plant_errors;
 mod regress_resources;

@@ -49,9 +49,9 @@ struct ShowArgs {
     /// Show this bag instead of the mission that flies.
     #[arg(long)]
     bag: Option<PathBuf>,
-    /// Namespace of the mission's nodes in the bag.
-    #[arg(long, default_value = graph::NAMESPACE, requires = "bag")]
-    namespace: String,
+    /// Namespace of the mission's nodes, such as /sat2 [default: /swath]
+    #[arg(long)]
+    namespace: Option<String>,
     /// Address and port; one that other machines reach needs TLS and tokens.
     #[arg(long, default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
@@ -118,10 +118,10 @@ impl TokensFile {
 ///
 /// # Errors
 /// When the bag or a file cannot be read, the address cannot be used, or DDS fails.
-pub fn run(args: &ConsoleArgs) -> Result<()> {
+pub fn run(args: &ConsoleArgs, ros: &RosArgs) -> Result<()> {
     match &args.command {
         Some(ConsoleCommand::Token(command)) => change_tokens(command),
-        None => Door::open(&args.show)?.show(&args.show),
+        None => Door::open(&args.show)?.show(&args.show, ros),
     }
 }
 
@@ -196,10 +196,11 @@ impl Door {
         Ok(Self { listener, tls, guard, url })
     }
 
-    fn show(self, args: &ShowArgs) -> Result<()> {
-        let Some(bag) = &args.bag else { return self.show_live(args) };
+    fn show(self, args: &ShowArgs, ros: &RosArgs) -> Result<()> {
+        let Some(bag) = &args.bag else { return self.show_live(args, ros) };
+        let namespace = args.namespace.as_deref().unwrap_or(graph::NAMESPACE);
         let shared = Shared::default();
-        let recording = shared.update(|ledger| replay::read(bag, &args.namespace, ledger))?;
+        let recording = shared.update(|ledger| replay::read(bag, namespace, ledger))?;
         let title = args.title.clone().unwrap_or(recording.title);
         let elevation_min_deg = recording.elevation_min_deg;
         let site = Site { shared, counter: None, title, elevation_min_deg, guard: self.guard };
@@ -208,8 +209,9 @@ impl Door {
         wait_for_the_end()
     }
 
-    fn show_live(self, args: &ShowArgs) -> Result<()> {
-        let node = Node::start(graph::CONSOLE, &RosArgs::default())?;
+    fn show_live(self, args: &ShowArgs, ros: &RosArgs) -> Result<()> {
+        let ros = args.namespace.as_ref().map_or_else(|| ros.clone(), |namespace| ros.clone().in_namespace(namespace));
+        let node = Node::start(graph::CONSOLE, &ros)?;
         let shutdown = Shutdown::on_signals(node.signal())?;
         let shared = Shared::default();
         let mut ear = Ear::new(&node)?;

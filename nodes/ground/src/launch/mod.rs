@@ -26,6 +26,9 @@ use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
+use swath_ros::RosArgs;
+
+use crate::place::Place;
 
 /// `swath launch`.
 #[derive(Debug, Args)]
@@ -66,6 +69,9 @@ pub struct LaunchArgs {
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080",
         conflicts_with = "in_process")]
     pub console: Option<std::net::SocketAddr>,
+    /// Where it flies.
+    #[command(flatten)]
+    pub place: Place,
 }
 
 impl LaunchArgs {
@@ -103,7 +109,7 @@ const NOT_AS_ASKED: u8 = 3;
 /// # Errors
 /// When the mission is not valid, a node fails or never comes up, or an output cannot be written. What was flown until
 /// then is in the outputs; where nothing was, there are none.
-pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
+pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
     if mission.sim.resources.is_some() && !args.in_process {
         bail!("a mission with [resources] flies in one process only: add --in-process");
@@ -114,7 +120,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
     let (requests, faults) = mission.initial_requests()?;
     faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
-    let flown = fly(args, &mission, &requests, &mut output, policies);
+    let flown = fly(args, &args.place.args(ros), &mission, &requests, &mut output, policies);
     let Flown { summary, failure } = match flown {
         Ok(flown) => flown,
         Err(error) => {
@@ -143,6 +149,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
 /// Flies a mission; an error where nothing was flown.
 fn fly(
     args: &LaunchArgs,
+    ros: &RosArgs,
     mission: &Mission,
     requests: &[Order],
     output: &mut OutputFolder,
@@ -155,7 +162,7 @@ fn fly(
         fly_in_process(&mission, output, policies)
     } else {
         let wishes = Wishes { record: !args.no_bag, console: args.console };
-        over_dds::fly(&mission, &mission_file, output, wishes, policies)
+        over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
     }
 }
 

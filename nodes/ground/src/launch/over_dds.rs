@@ -42,24 +42,29 @@ pub struct Wishes {
 pub fn fly(
     mission: &Mission,
     mission_file: &Path,
+    ros: &RosArgs,
     output: &mut OutputFolder,
     wishes: Wishes,
     policies: &Policies,
 ) -> Result<Flown> {
-    let mut launcher = Launcher::start(mission)?;
+    let mut launcher = Launcher::start(mission, ros)?;
+    let namespace = launcher.node.names().namespace().to_owned();
     let mut fleet = Fleet::default();
     let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
         let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
-        let words: Vec<String> = words.map(str::to_owned).into_iter().chain(manifest_data(mission, policies)).collect();
+        let words: Vec<String> =
+            words.map(str::to_owned).into_iter().chain(manifest_data(mission, &namespace, policies)).collect();
+        let words: Vec<String> =
+            words.into_iter().chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words, true)?;
         fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
     }
     if let Some(address) = wishes.console {
-        show(&mut fleet, &mission.name, address)?;
+        show(&mut fleet, &mission.name, &namespace, address)?;
     }
-    start_nodes(&mut fleet, mission_file, output, wishes)?;
+    start_nodes(&mut fleet, mission_file, &namespace, output, wishes)?;
     let nodes = fleet.processes();
     let watched = launcher.watch(&mut fleet, output);
     let Some(flown) = launcher.flown else {
@@ -97,8 +102,8 @@ pub fn fly(
 }
 
 /// What the manifest of the bag tells besides the mission.
-fn manifest_data(mission: &Mission, policies: &Policies) -> Vec<String> {
-    let mut entries = vec![format!("revision={}", policies.revision)];
+fn manifest_data(mission: &Mission, namespace: &str, policies: &Policies) -> Vec<String> {
+    let mut entries = vec![format!("revision={}", policies.revision), format!("namespace={namespace}")];
     match (policies.digest)(&mission.planner) {
         Ok(Some(digest)) => entries.push(format!("policy_hash={digest}")),
         Ok(None) => {}
@@ -109,18 +114,29 @@ fn manifest_data(mission: &Mission, policies: &Policies) -> Vec<String> {
 }
 
 /// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
-fn show(fleet: &mut Fleet, title: &str, address: SocketAddr) -> Result<()> {
-    let words = ["console".to_owned(), format!("--listen={address}"), format!("--title={title}")];
+fn show(fleet: &mut Fleet, title: &str, namespace: &str, address: SocketAddr) -> Result<()> {
+    let words = [
+        "console".to_owned(),
+        format!("--listen={address}"),
+        format!("--title={title}"),
+        format!("--namespace={namespace}"),
+    ];
     fleet.start_beside(graph::CONSOLE, "swath", &words)?;
     out::say(format_args!("console: {}", fleet.wait_for_line(graph::CONSOLE, START_TIMEOUT)?));
     Ok(())
 }
 
-fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, wishes: Wishes) -> Result<()> {
+fn start_nodes(
+    fleet: &mut Fleet,
+    mission_file: &Path,
+    namespace: &str,
+    output: &OutputFolder,
+    wishes: Wishes,
+) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
     let words = |extra: &[String]| {
         let own = ["--ros-args", "-p", &mission].map(str::to_owned);
-        own.into_iter().chain(extra.iter().cloned()).collect::<Vec<_>>()
+        own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
     fleet.start_and_keep(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
@@ -136,6 +152,11 @@ fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, wi
     }
     let wait_for = ["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
     fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for), false)
+}
+
+/// The words after `--ros-args` that put a node into a namespace.
+fn in_namespace(namespace: &str) -> [String; 2] {
+    ["-r".to_owned(), format!("__ns:={namespace}")]
 }
 
 fn text(path: &Path) -> Result<String> {
@@ -178,8 +199,8 @@ struct Reached {
 }
 
 impl Launcher {
-    fn start(mission: &Mission) -> Result<Self> {
-        let node = Node::start(graph::LAUNCHER, &RosArgs::default())?;
+    fn start(mission: &Mission, ros: &RosArgs) -> Result<Self> {
+        let node = Node::start(graph::LAUNCHER, ros)?;
         let model = mission.model()?;
         Ok(Self {
             shutdown: Shutdown::on_signals(node.signal())?,
@@ -221,6 +242,10 @@ impl Launcher {
                 bail!("interrupted");
             }
             while let Some(point) = self.points.take()? {
+                if point.tick > self.horizon.0 {
+                    tracing::warn!("a decision point of tick {} lies after the mission's end", point.tick);
+                    continue;
+                }
                 last_news = Instant::now();
                 let (end, began) = (Tick(point.tick), self.flown.map_or(last_news, |flown| flown.began));
                 self.flown = Some(Reached { end, began, last: last_news });
@@ -250,6 +275,9 @@ impl Launcher {
     }
 
     fn take_rest(&mut self, output: &mut OutputFolder) -> Result<()> {
+        for notice in self.node.notices() {
+            tracing::warn!("{}: {notice}", notice.trouble.name());
+        }
         while let Some(result) = self.results.take()? {
             self.log.settled(result.task, result.reward);
         }

@@ -11,6 +11,7 @@ pub mod refusal;
 pub mod register;
 pub mod request;
 mod settle;
+mod sharing;
 
 #[cfg(test)]
 mod tests;

@@ -158,7 +158,7 @@ struct Change {
 }
 
 fn outcome(name: String, result: &msg::SubmitResult) -> Outcome {
-    let msg::SubmitResult { accepted, id, reason_code, ref reason } = *result;
+    let msg::SubmitResult { accepted, id, reason_code, ref reason, .. } = *result;
     Outcome { name, accepted, id, reason_code, reason: reason.clone() }
 }
 

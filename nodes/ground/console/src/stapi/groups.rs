@@ -1,4 +1,4 @@
-//! Orders as the strips that they were cut into: those of one submitter and one reference.
+//! Orders as the strips that they were cut into.
 
 use std::collections::BTreeMap;
 
@@ -20,28 +20,16 @@ pub struct Group {
     pub request: msg::StripRequest,
 }
 
-/// The reference that the pieces of a line or area share: `REF` of `REF 2/7`.
-fn whole(reference: &str) -> &str {
-    let piece =
-        |tail: &str| tail.split_once('/').is_some_and(|(k, n)| k.parse::<u32>().is_ok() && n.parse::<u32>().is_ok());
-    reference.rsplit_once(' ').filter(|(_, tail)| piece(tail)).map_or(reference, |(head, _)| head)
-}
-
 /// Numbers of the strips of every order, in the order of their first ones.
 #[must_use]
 pub fn all(server: &Server) -> Vec<Vec<u64>> {
     server.site.shared.read(|ledger| {
-        let mut groups: BTreeMap<(&str, &str), Vec<u64>> = BTreeMap::new();
-        let mut alone = Vec::new();
+        let mut groups: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
         for (id, status) in ledger.requests() {
-            match whole(&status.client_ref) {
-                "" => alone.push(vec![*id]),
-                reference => groups.entry((&status.submitter, reference)).or_default().push(*id),
-            }
+            // A strip that is an order of its own, of a mission that does not number orders.
+            groups.entry(if status.order_id == 0 { *id } else { status.order_id }).or_default().push(*id);
         }
-        alone.extend(groups.into_values());
-        alone.sort();
-        alone
+        groups.into_values().collect()
     })
 }
 
@@ -95,18 +83,4 @@ pub async fn fetch(server: &Server, ids: &[u64]) -> Result<(), Problem> {
     server.site.shared.update(|ledger| found.iter().for_each(|(status, _)| ledger.strip(status)));
     server.asked.learn(found.into_iter().map(|(status, request)| (status.strip.id, request)));
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::whole;
-
-    #[test]
-    fn pieces_share_a_reference() {
-        for (reference, expected) in
-            [("a 2/7", "a"), ("a 1 2/7", "a 1"), ("a", "a"), ("a 2", "a 2"), ("a b/c", "a b/c"), ("", ""), (" 1/2", "")]
-        {
-            assert_eq!(whole(reference), expected);
-        }
-    }
 }
