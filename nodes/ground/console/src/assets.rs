@@ -20,10 +20,14 @@ macro_rules! asset {
     };
 }
 
+/// Digest of the sources that they are made from.
+pub const SOURCES: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/web/dist/SOURCES"));
+
 /// All of them.
-pub const ASSETS: [Asset; 4] = [
+pub const ASSETS: [Asset; 5] = [
     asset!("/", "index.html", "text/html; charset=utf-8"),
     asset!("/console.js", "console.js", "text/javascript; charset=utf-8"),
     asset!("/console.css", "console.css", "text/css; charset=utf-8"),
+    asset!("/stream.js", "stream.js", "text/javascript; charset=utf-8"),
     asset!("/icon.svg", "icon.svg", "image/svg+xml"),
 ];

@@ -20,6 +20,10 @@ pub struct Desks {
     pub submit: Client<msg::SubmitStrips>,
     /// Takes requests back.
     pub cancel: Client<msg::CancelStrips>,
+    /// Replaces a request by another one.
+    pub replace: Client<msg::ReplaceStrip>,
+    /// What strips may be.
+    pub limits: Client<msg::GetLimits>,
     /// Holds, releases and rejects requests.
     pub review: Client<msg::ReviewStrips>,
     /// All that is known of a request.
@@ -45,6 +49,8 @@ impl Desks {
         Ok(Self {
             submit: node.client(&graph::SUBMIT_STRIPS)?,
             cancel: node.client(&graph::CANCEL_STRIPS)?,
+            replace: node.client(&graph::REPLACE_STRIP)?,
+            limits: node.client(&graph::GET_LIMITS)?,
             review: node.client(&graph::REVIEW_STRIPS)?,
             get: node.client(&graph::GET_STRIP)?,
             list: node.client(&graph::LIST_STRIPS)?,

@@ -225,6 +225,19 @@ pub enum Fact {
     Acknowledged {
         /// Its number.
         alarm: u64,
+        /// Who.
+        actor: String,
+    },
+    /// An operator has put an alarm aside for a while.
+    Shelved {
+        /// Its number.
+        alarm: u64,
+        /// Until then it does not count.
+        until_ms: f64,
+        /// Who.
+        actor: String,
+        /// Why.
+        reason: String,
     },
     /// Which nodes of the mission are there.
     Nodes {

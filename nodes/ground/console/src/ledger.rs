@@ -8,6 +8,7 @@ use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs as msg;
+use swath_node::stamp::nanoseconds;
 
 use crate::facts::{self, Fact, milliseconds};
 
@@ -25,6 +26,8 @@ pub struct Ledger {
     alarms: BTreeMap<(String, String), u64>,
     acknowledged: BTreeSet<u64>,
     present: Option<BTreeSet<String>>,
+    /// How each request stands.
+    requests: BTreeMap<u64, msg::StripStatus>,
     tasks: u64,
     results: u64,
     offers: u64,
@@ -77,6 +80,7 @@ impl Default for Ledger {
             alarms: BTreeMap::new(),
             acknowledged: BTreeSet::new(),
             present: None,
+            requests: BTreeMap::new(),
             tasks: 0,
             results: 0,
             offers: 0,
@@ -95,6 +99,24 @@ impl Ledger {
     #[must_use]
     pub fn now_ms(&self) -> f64 {
         self.now_ms
+    }
+
+    /// How each request stands, by number.
+    #[must_use]
+    pub fn requests(&self) -> &BTreeMap<u64, msg::StripStatus> {
+        &self.requests
+    }
+
+    /// Length of a tick [s].
+    #[must_use]
+    pub fn tick_s(&self) -> f64 {
+        self.clock.told.map_or(TICK_MS, |(_, length)| length) / 1000.0
+    }
+
+    /// Time of tick 0 [ns since 1970-01-01 UTC].
+    #[must_use]
+    pub fn epoch_ns(&self) -> u64 {
+        self.clock.told.map_or(0, |(epoch, _)| (epoch * 1e6) as u64)
     }
 
     /// Up to `limit` facts with greater numbers than `after`, as JSON, in order.
@@ -144,6 +166,11 @@ impl Ledger {
         if id == 0 {
             self.tell_at(stamp, &facts::refused(status));
             return;
+        }
+        // A list that was asked for before a change may come after it.
+        let newer = |known: &msg::StripStatus| nanoseconds(&known.header.stamp) > nanoseconds(stamp);
+        if !self.requests.get(&id).is_some_and(newer) {
+            self.requests.insert(id, status.clone());
         }
         match self.told.insert(id, (status.state, *stamp)) {
             None => self.tell_at(stamp, &facts::strip(status)),
@@ -254,12 +281,22 @@ impl Ledger {
     }
 
     /// An operator has seen an alarm; whether it stood.
-    pub fn acknowledge(&mut self, alarm: u64) -> bool {
+    pub fn acknowledge(&mut self, alarm: u64, actor: &str) -> bool {
         let known = self.alarms.values().any(|number| *number == alarm);
         if !known || !self.acknowledged.insert(alarm) {
             return false;
         }
-        self.tell(self.now_ms, &Fact::Acknowledged { alarm });
+        self.tell(self.now_ms, &Fact::Acknowledged { alarm, actor: actor.to_owned() });
+        true
+    }
+
+    /// An operator puts an alarm aside for some minutes of simulated time; whether there is such an alarm.
+    pub fn shelve(&mut self, alarm: u64, minutes: u32, actor: &str, reason: &str) -> bool {
+        if !self.alarms.values().any(|number| *number == alarm) {
+            return false;
+        }
+        let until_ms = self.now_ms + f64::from(minutes) * 60_000.0;
+        self.tell(self.now_ms, &Fact::Shelved { alarm, until_ms, actor: actor.to_owned(), reason: reason.to_owned() });
         true
     }
 
@@ -332,8 +369,11 @@ mod tests {
         ledger.strip(&accepted);
         ledger.strip(&accepted);
         ledger.strip(&status(7, msg::StripStatus::STATE_SCHEDULED, 5, 10));
+        // A list that was asked for before.
+        ledger.strip(&accepted);
+        assert_eq!(ledger.requests()[&7].state, msg::StripStatus::STATE_SCHEDULED);
         ledger.strip(&status(0, msg::StripStatus::STATE_REJECTED, 5, 10));
-        assert_eq!(kinds(&ledger), ["clock", "strip", "change", "change", "refused"]);
+        assert_eq!(kinds(&ledger), ["clock", "strip", "change", "change", "change", "refused"]);
         for (number, fact) in (1..).zip(told(&ledger)) {
             assert_eq!(fact["n"], number);
         }
@@ -378,11 +418,11 @@ mod tests {
         raise(&mut ledger, "guidance: late", DiagnosticStatus::WARN);
         raise(&mut ledger, "guidance: well", DiagnosticStatus::OK);
         raise(&mut ledger, "planner: lost", DiagnosticStatus::ERROR);
-        assert!(ledger.acknowledge(1));
-        assert!(!ledger.acknowledge(1), "it is acknowledged");
-        assert!(!ledger.acknowledge(3), "there is no such alarm");
+        assert!(ledger.acknowledge(1, "console"));
+        assert!(!ledger.acknowledge(1, "console"), "it is acknowledged");
+        assert!(!ledger.acknowledge(3, "console"), "there is no such alarm");
         raise(&mut ledger, "guidance: late", DiagnosticStatus::WARN);
-        assert!(ledger.acknowledge(1), "it stands again");
+        assert!(ledger.acknowledge(1, "console"), "it stands again");
         let numbers: Vec<_> = told(&ledger).iter().map(|fact| (fact["kind"].clone(), fact["alarm"].clone())).collect();
         let expected = [("alarm", 1), ("alarm", 2), ("acknowledged", 1), ("alarm", 1), ("acknowledged", 1)];
         assert_eq!(numbers, expected.map(|(kind, alarm)| (json!(kind), json!(alarm))));

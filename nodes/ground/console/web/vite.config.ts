@@ -28,6 +28,7 @@ function digest(): Plugin {
 // Fixed names: the server has a table of these files.
 export default defineConfig({
   plugins: [digest()],
+  worker: { format: "es", rollupOptions: { output: { entryFileNames: "stream.js" } } },
   build: {
     target: "es2022",
     assetsInlineLimit: 0,

@@ -26,6 +26,8 @@ struct Member {
     lines: Option<Receiver<String>>,
     /// How to start it again when it is killed.
     revive: Option<(PathBuf, Vec<String>)>,
+    /// Whether the mission goes on without it.
+    beside: bool,
 }
 
 impl Fleet {
@@ -50,7 +52,17 @@ impl Fleet {
             });
             receiver
         });
-        self.members.push(Member { name: name.to_owned(), child, lines, revive: None });
+        self.members.push(Member { name: name.to_owned(), child, lines, revive: None, beside: false });
+        Ok(())
+    }
+
+    /// As [`Self::start_and_keep`] and listened to, for a process without which the mission goes on.
+    pub fn start_beside(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
+        self.start(name, program, args, true)?;
+        if let Some(member) = self.members.last_mut() {
+            member.revive = Some((program_path(program), args.to_vec()));
+            member.beside = true;
+        }
         Ok(())
     }
 
@@ -68,7 +80,9 @@ impl Fleet {
         let deadline = Instant::now() + timeout;
         loop {
             let member = self.members.iter().find(|member| member.name == name);
-            let lines = member.and_then(|member| member.lines.as_ref()).context("the process is not listened to")?;
+            let lines = member
+                .and_then(|member| member.lines.as_ref())
+                .with_context(|| format!("{name} has ended, and has said why"))?;
             if let Ok(line) = lines.recv_timeout(Duration::from_millis(50)) {
                 return Ok(line);
             }
@@ -79,9 +93,10 @@ impl Fleet {
         }
     }
 
-    /// Fails when a process has ended; starts it again when it was killed and can go on.
+    /// Fails when a process has ended that the mission needs; starts it again when it was killed and can go on.
     pub fn check(&mut self) -> Result<()> {
-        for member in &mut self.members {
+        let mut left = None;
+        for (at, member) in self.members.iter_mut().enumerate() {
             let Some(status) = member.child.try_wait()? else { continue };
             match &member.revive {
                 // One that ends by itself has said why, and would do so again.
@@ -90,8 +105,16 @@ impl Fleet {
                     let start = Command::new(path).args(args).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
                     member.child = start.with_context(|| format!("cannot start node {} again", member.name))?;
                 }
+                _ if member.beside => {
+                    tracing::warn!("{}; the mission goes on", ending(&member.name, status));
+                    left = Some(at);
+                }
                 _ => bail!("{} before the mission was over", ending(&member.name, status)),
             }
+        }
+        // Another one that has ended is looked at the next time.
+        if let Some(at) = left {
+            self.members.swap_remove(at);
         }
         Ok(())
     }

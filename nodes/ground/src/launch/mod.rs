@@ -17,6 +17,7 @@ use swath_sim::task::Totals;
 use swath_sim::time::Tick;
 
 use output::{Flown, OutputFolder};
+use over_dds::Wishes;
 use progress::Progress;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::file::Mission;
@@ -32,7 +33,8 @@ use crate::place::Place;
 /// `swath launch`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  swath launch examples/missions/one_orbit.toml --out out/one\n  \
-    swath launch examples/missions/one_orbit.toml --in-process --seed 7")]
+    swath launch examples/missions/one_orbit.toml --in-process --seed 7\n  \
+    swath launch examples/missions/operators_day.toml --console")]
 pub struct LaunchArgs {
     /// Mission file (TOML).
     pub mission: PathBuf,
@@ -63,6 +65,10 @@ pub struct LaunchArgs {
     /// Print the summary as JSON instead of a table.
     #[arg(long)]
     pub json: bool,
+    /// Show the mission as a page in a browser, at this address of this machine.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080",
+        conflicts_with = "in_process")]
+    pub console: Option<std::net::SocketAddr>,
     /// Where it flies.
     #[command(flatten)]
     pub place: Place,
@@ -160,7 +166,8 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
-        over_dds::fly(&mission, &mission_file, ros, output, !args.no_bag, policies)
+        let wishes = Wishes { record: !args.no_bag, console: args.console };
+        over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
     }
 }
 

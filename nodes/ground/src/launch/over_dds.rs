@@ -1,5 +1,6 @@
 //! A mission over DDS: four nodes and the recorder, each a process of its own.
 
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -23,13 +24,22 @@ use swath_mission::guarded::{Deciders, Policies, made_instead};
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
-/// How long the recorder may take to come up.
-const RECORDER_TIMEOUT: Duration = Duration::from_secs(20);
+/// How long the recorder and the console may take to come up.
+const START_TIMEOUT: Duration = Duration::from_secs(20);
 /// In lockstep, a mission without a decision for so long has stalled.
 const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long the last summary of the requests may take.
 const SUMMARY_TIMEOUT: Duration = Duration::from_secs(5);
 const WAIT: Duration = Duration::from_millis(100);
+
+/// What there is besides the nodes that fly.
+#[derive(Clone, Copy)]
+pub struct Wishes {
+    /// Whether a bag is recorded.
+    pub record: bool,
+    /// Where the console listens, if there is one.
+    pub console: Option<SocketAddr>,
+}
 
 /// Flies a mission over DDS; an error where nothing was flown.
 pub fn fly(
@@ -37,12 +47,13 @@ pub fn fly(
     mission_file: &Path,
     ros: &RosArgs,
     output: &mut OutputFolder,
-    record: bool,
+    wishes: Wishes,
     policies: &Policies,
 ) -> Result<Flown> {
     let mut launcher = Launcher::start(mission, ros)?;
     let namespace = launcher.node.names().namespace().to_owned();
     let mut fleet = Fleet::default();
+    let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
         let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
@@ -51,9 +62,12 @@ pub fn fly(
         let words: Vec<String> =
             words.into_iter().chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words, true)?;
-        fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
+        fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
     }
-    start_nodes(&mut fleet, mission_file, &namespace, output, record)?;
+    if let Some(address) = wishes.console {
+        show(&mut fleet, &mission.name, &namespace, address)?;
+    }
+    start_nodes(&mut fleet, mission_file, &namespace, output, wishes)?;
     let nodes = fleet.processes();
     let watched = launcher.watch(&mut fleet, output);
     let Some(flown) = launcher.flown else {
@@ -103,12 +117,25 @@ fn manifest_data(mission: &Mission, namespace: &str, policies: &Policies) -> Vec
     entries.into_iter().flat_map(|entry| ["--manifest-data".to_owned(), entry]).collect()
 }
 
+/// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
+fn show(fleet: &mut Fleet, title: &str, namespace: &str, address: SocketAddr) -> Result<()> {
+    let words = [
+        "console".to_owned(),
+        format!("--listen={address}"),
+        format!("--title={title}"),
+        format!("--namespace={namespace}"),
+    ];
+    fleet.start_beside(graph::CONSOLE, "swath", &words)?;
+    out::say(format_args!("console: {}", fleet.wait_for_line(graph::CONSOLE, START_TIMEOUT)?));
+    Ok(())
+}
+
 fn start_nodes(
     fleet: &mut Fleet,
     mission_file: &Path,
     namespace: &str,
     output: &OutputFolder,
-    record: bool,
+    wishes: Wishes,
 ) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
     let words = |extra: &[String]| {
@@ -121,8 +148,11 @@ fn start_nodes(
         fleet.start(name, program, &words(&[]), false)?;
     }
     let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
-    if record {
+    if wishes.record {
         peers.push(graph::RECORDER);
+    }
+    if wishes.console.is_some() {
+        peers.push(graph::CONSOLE);
     }
     let wait_for = ["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
     fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for), false)

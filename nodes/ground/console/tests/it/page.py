@@ -2,13 +2,17 @@
 
 import json
 import os
+import shutil
 import sys
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
 URL, FOLDER = sys.argv[1], Path(sys.argv[2])
-CHROMIUM = os.environ.get("SWATH_CHROMIUM", "/usr/bin/chromium")
+NAMES = ["chromium", "chromium-browser", "google-chrome"]
+CHROMIUM = os.environ.get("SWATH_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+if CHROMIUM is None:
+    sys.exit("no Chromium to look at the console with: apt-get install chromium, or set SWATH_CHROMIUM")
 
 
 def legend(page):

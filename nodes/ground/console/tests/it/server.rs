@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use serde_json::Value;
-use swath_console::{ASSETS, Shared, Site, listen, read_bag, serve};
+use swath_console::{ASSETS, Guard, Shared, Site, listen, read_bag, serve};
 
 /// The sample mission, served for all tests of this binary.
 pub fn replay() -> SocketAddr {
@@ -16,11 +16,12 @@ pub fn replay() -> SocketAddr {
         let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../bags/samples/mission");
         let shared = Shared::default();
         let recording = shared.update(|ledger| read_bag(&bag, "/swath", ledger)).unwrap();
-        let site =
-            Site { shared, counter: None, title: recording.title, elevation_min_deg: recording.elevation_min_deg };
-        let listener = listen("127.0.0.1:0".parse().unwrap()).unwrap();
+        let listener = listen("127.0.0.1:0".parse().unwrap(), false).unwrap();
         let address = listener.local_addr().unwrap();
-        std::thread::spawn(move || serve(listener, site));
+        let (title, elevation_min_deg) = (recording.title, recording.elevation_min_deg);
+        let guard = Guard::of_this_machine(address.port());
+        let site = Site { shared, counter: None, title, elevation_min_deg, guard };
+        std::thread::spawn(move || serve(listener, None, site));
         address
     })
 }
@@ -126,6 +127,6 @@ fn what_is_not_in_order_is_refused() {
     assert!(head.contains("application/problem+json") && body.contains("recording"), "{head}\n{body}");
     let (code, ..) = exchange("GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
     assert_eq!(code, 421);
-    let error = listen("0.0.0.0:0".parse().unwrap()).unwrap_err().to_string();
+    let error = listen("0.0.0.0:0".parse().unwrap(), false).unwrap_err().to_string();
     assert!(error.contains("other machines"), "{error}");
 }

@@ -1,7 +1,8 @@
 // Calls to the server, and the stream of facts that comes from it.
 
 import type { Fact } from "./facts";
-import { connected, info, message, restart, take, type Info } from "./store";
+import { connected, info, locked, message, restart, take, type Info } from "./store";
+import { follow, type Told } from "./stream";
 
 export interface Outcome {
   name: string;
@@ -15,7 +16,7 @@ export interface Opportunity {
   open_ms: number;
   close_ms: number;
   min_elevation_deg: number;
-  acquire_s: number;
+  acquire_ticks: number;
   transition_ticks: number | null;
   conflicts: number;
   conflict_ids: number[];
@@ -30,7 +31,7 @@ export interface Preview {
 
 export interface Report {
   opportunities: Opportunity[];
-  attempts: { task: number; state: string; max_error: number; min_elevation_deg: number; reason_code: number }[];
+  attempts: { task: number; start: number; state: number; max_error: number; min_elevation_deg: number; reason_code: number; reward: number }[];
   history: { t: number; state: string; reason: string; reason_code: number; actor: string }[];
 }
 
@@ -67,12 +68,29 @@ export function tellOutcomes(done: string, outcomes: readonly Outcome[]): void {
   message.value = [`${taken} ${done}`, ...(refused.length ? [`${refused.length} refused`, ...why] : [])].join(" · ");
 }
 
-/** Follows the facts for as long as the page is open; the browser connects again by itself, where it was. */
-export async function follow(): Promise<void> {
-  info.value = await get<Info>("/api/info");
-  const source = new EventSource("/api/facts");
-  source.onopen = () => (connected.value = true);
-  source.onerror = () => (connected.value = false);
-  source.addEventListener("restart", () => restart());
-  source.addEventListener("facts", (event) => take(JSON.parse((event as MessageEvent<string>).data) as Fact[]));
+function hear(told: Told): void {
+  if (told.kind === "facts") take(JSON.parse(told.text) as Fact[]);
+  else if (told.kind === "restart") restart();
+  else connected.value = told.kind === "open";
+}
+
+/** Follows the facts for as long as the page is open, with the other tabs of this browser where it can. */
+export async function begin(): Promise<void> {
+  const response = await fetch("/api/info");
+  if (response.status === 401) {
+    locked.value = true;
+    return;
+  }
+  info.value = await answer<Info>(response);
+  locked.value = false;
+  if (typeof SharedWorker === "undefined") return follow(hear);
+  const worker = new SharedWorker(new URL("./shared.ts", import.meta.url), { type: "module", name: info.value.run });
+  worker.port.onmessage = (event: MessageEvent<Told>) => hear(event.data);
+  addEventListener("pagehide", () => worker.port.postMessage("gone"));
+}
+
+/** Hands in a token. */
+export async function login(token: string): Promise<void> {
+  await post("/api/login", { token });
+  await begin();
 }

@@ -147,6 +147,15 @@ export interface AlarmFact extends Head {
 export interface AcknowledgedFact extends Head {
   kind: "acknowledged";
   alarm: number;
+  actor: string;
+}
+
+export interface ShelvedFact extends Head {
+  kind: "shelved";
+  alarm: number;
+  until_ms: number;
+  actor: string;
+  reason: string;
 }
 
 export interface NodesFact extends Head {
@@ -171,4 +180,5 @@ export type Fact =
   | SummaryFact
   | AlarmFact
   | AcknowledgedFact
+  | ShelvedFact
   | NodesFact;

@@ -47,6 +47,16 @@ export function inView(strip: Strip): boolean {
   });
 }
 
+/** Moves the map to a strip that it does not show. */
+export function reveal(strip: Strip): void {
+  const [lon, lat] = strip.start;
+  const path = size && geoPath(projection(size[0], size[1]));
+  const seen = path && path.measure({ type: "LineString", coordinates: [strip.start, strip.end] }) > 0;
+  if (seen && inView(strip)) return;
+  following.value = false;
+  view.value = { ...view.value, lon, lat: globe.value || view.value.zoom > 1 ? lat : 0 };
+}
+
 let size: [number, number] | undefined;
 
 const lines = (coordinates: Place[][]) => ({ type: "MultiLineString" as const, coordinates });
@@ -97,28 +107,30 @@ function draw(canvas: HTMLCanvasElement): void {
     context.fillStyle = colour;
     context.fill();
   };
-  context.fillStyle = "#05090d";
+  context.fillStyle = "#070c11";
   context.fillRect(0, 0, width, height);
-  fill({ type: "Sphere" }, "#0b1a26");
-  fill(land, "#22364a");
-  stroke(grid, "#1b2b3a", 0.5);
+  fill({ type: "Sphere" }, "#10212f");
+  fill(land, "#2f4558");
+  stroke(land, "#4a647a", 0.5);
+  stroke(grid, "#ffffff12", 0.5);
   if (t > 0) {
     const [lon, lat] = subsolar(t);
-    fill(geoCircle().center([lon + 180, -lat]).radius(90)(), "#00000066");
+    fill(geoCircle().center([lon + 180, -lat]).radius(90)(), "#00000055");
   }
   strips(now, t, stroke);
   const { behind, ahead } = track(now, t);
-  stroke(lines([behind]), "#9fb4c7", 1.5);
-  stroke(lines([ahead]), "#9fb4c7", 1, [3, 5]);
+  stroke(lines([behind]), "#e8eef3", 1.6);
+  stroke(lines([ahead]), "#e8eef3a0", 1, [3, 5]);
   const at = satellite(now, t);
   if (at) {
     const elevation = info.value.elevation_min_deg;
     if (elevation > 0) {
       const shape = geoCircle().center(at.place).radius(footprintRadius(at.altitude, elevation))();
-      stroke(shape, "#9fb4c7", 1);
-      fill(shape, "#9fb4c718");
+      stroke(shape, "#e8eef390", 1);
+      fill(shape, "#e8eef314");
     }
-    fill(geoCircle().center(at.place).radius(1.2 / view.value.zoom)(), "#ffffff");
+    const project = projection(width, height);
+    arrow(context, project, at.place, ahead[1] ?? at.place, path);
   }
   const marks = drawn.value;
   if (marks.length) {
@@ -143,6 +155,29 @@ function strips(now: World, t: number, stroke: (shape: GeoJSON.MultiLineString, 
     if (places.length) stroke(lines(places), look.colour, look.width, look.dash);
   });
   if (chosen.length) stroke(lines(chosen), "#ff00ff", 4);
+}
+
+/** The satellite, pointing where it flies; nothing on the far side of the globe. */
+function arrow(context: CanvasRenderingContext2D, project: GeoProjection, place: Place, next: Place, path: ReturnType<typeof geoPath>): void {
+  if (path.measure({ type: "LineString", coordinates: [place, [place[0] + 0.1, place[1]]] }) === 0) return;
+  const [from, to] = [project(place), project(next)];
+  if (!from || !to) return;
+  context.save();
+  context.translate(from[0], from[1]);
+  context.rotate(Math.atan2(to[1] - from[1], to[0] - from[0]));
+  context.beginPath();
+  context.moveTo(11, 0);
+  context.lineTo(-6, 6);
+  context.lineTo(-3, 0);
+  context.lineTo(-6, -6);
+  context.closePath();
+  context.fillStyle = "#ffffff";
+  context.strokeStyle = "#05090d";
+  context.lineWidth = 1.5;
+  context.setLineDash([]);
+  context.stroke();
+  context.fill();
+  context.restore();
 }
 
 /** The strip nearest to a point of the canvas; 0 when none is near. */
@@ -170,12 +205,24 @@ function onClick(event: MouseEvent): void {
     const place = projection(size[0], size[1]).invert?.([event.offsetX, event.offsetY]);
     if (!place) return;
     drawn.value = drawn.value.length >= 2 ? [place] : [...drawn.value, place];
+    if (drawn.value.length >= 2) drawing.value = false;
     return;
   }
   select(nearest(event.offsetX, event.offsetY), event.ctrlKey || event.shiftKey);
 }
 
+/** Whether the map keeps the satellite in its middle. */
+const following = signal(false);
+
+effect(() => {
+  if (!following.value) return;
+  const at = satellite(world.value, shown.value);
+  const known = view.peek();
+  if (at) view.value = { lon: at.place[0], lat: globe.value ? at.place[1] : known.lat, zoom: known.zoom };
+});
+
 function pan(dx: number, dy: number): void {
+  following.value = false;
   const { lon, lat, zoom } = view.value;
   const degrees = 180 / (Math.PI * (projection(...(size ?? [800, 400])).scale() || 1));
   const turned = ((((lon - dx * degrees + 180) % 360) + 360) % 360) - 180;
@@ -185,6 +232,21 @@ function pan(dx: number, dy: number): void {
 function zoomBy(factor: number): void {
   const { lon, lat, zoom } = view.value;
   view.value = { lon, lat, zoom: Math.max(0.5, Math.min(60, zoom * factor)) };
+}
+
+/** What the pointer is on. */
+const hint = signal<{ x: number; y: number; text: string } | null>(null);
+
+function point(event: PointerEvent): void {
+  const [x, y] = [event.offsetX, event.offsetY];
+  const strip = world.value.strips.get(nearest(x, y));
+  const change = strip && world.value.changeAt(strip, shown.value);
+  if (strip && change) {
+    hint.value = { x, y, text: `${strip.id} ${strip.name} · ${lookOf(change.state).name} · ${strip.priority.toFixed(2)}` };
+    return;
+  }
+  const place = drawing.value && size ? projection(size[0], size[1]).invert?.([x, y]) : undefined;
+  hint.value = place ? { x, y, text: `${place[1].toFixed(2)}, ${place[0].toFixed(2)}` } : null;
 }
 
 function onKey(event: KeyboardEvent): void {
@@ -246,13 +308,15 @@ export function WorldMap() {
           event.preventDefault();
           zoomBy(event.deltaY < 0 ? 1.2 : 1 / 1.2);
         }}
+        onPointerLeave={() => (hint.value = null)}
         onPointerDown={(event) => {
+          hint.value = null;
           held.current = { x: event.clientX, y: event.clientY, moved: false };
           event.currentTarget.setPointerCapture(event.pointerId);
         }}
         onPointerMove={(event) => {
           const hold = held.current;
-          if (!hold) return;
+          if (!hold) return point(event);
           const [dx, dy] = [event.clientX - hold.x, event.clientY - hold.y];
           if (!hold.moved && Math.hypot(dx, dy) < 4) return;
           pan(dx, dy);
@@ -263,11 +327,17 @@ export function WorldMap() {
           held.current = null;
         }}
       />
+      {hint.value && <div class="hint" style={{ left: `${hint.value.x + 14}px`, top: `${hint.value.y + 10}px` }}>{hint.value.text}</div>}
+      {drawing.value && <p class="prompt" role="status">{drawn.value.length === 1 ? "click where the strip ends" : "click where the strip starts"}</p>}
       <div class="tools">
         <button aria-pressed={globe.value} onClick={() => (globe.value = !globe.value)}>globe</button>
+        <button aria-pressed={following.value} onClick={() => (following.value = !following.value)}>follow</button>
         <button aria-label="zoom in" onClick={() => zoomBy(1.5)}>+</button>
         <button aria-label="zoom out" onClick={() => zoomBy(1 / 1.5)}>−</button>
-        <button onClick={() => (view.value = { lon: 0, lat: 0, zoom: 1 })}>whole</button>
+        <button onClick={() => {
+          following.value = false;
+          view.value = { lon: 0, lat: 0, zoom: 1 };
+        }}>whole</button>
       </div>
       <Legend />
     </section>

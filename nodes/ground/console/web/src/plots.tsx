@@ -19,7 +19,7 @@ interface PlotProps {
   data: () => uPlot.AlignedData;
 }
 
-const HEIGHT = 92;
+const HEIGHT = 86;
 /** Width of a plot's name, which stands beside its axis [px]. */
 const LABEL = 18;
 
@@ -29,8 +29,8 @@ function options(title: string, curves: Curve[], width: number): uPlot.Options {
     width,
     height: HEIGHT,
     padding: [8, 0, 4, 0],
-    cursor: { drag: { setScale: false, x: false, y: false }, sync: { key: "time" } },
-    legend: { show: true, live: true },
+    cursor: { drag: { setScale: false, x: false, y: false }, sync: { key: "time" }, points: { size: 5 } },
+    legend: { show: true, live: true, markers: { width: 0, fill: (_, i) => curves[i - 1]?.colour ?? "#9fb4c7" } },
     scales: { x: { time: true, auto: false, range: () => span.value.map((t) => t / 1000) as [number, number] } },
     axes: [
       { show: false },
@@ -38,7 +38,7 @@ function options(title: string, curves: Curve[], width: number): uPlot.Options {
     ],
     series: [
       { label: "time", value: (_, value) => (value == null ? "" : stamp(value * 1000)) },
-      ...curves.map((curve) => ({ label: curve.label, stroke: curve.colour, width: 1.2, points: { show: false } })),
+      ...curves.map((curve) => ({ label: curve.label, stroke: curve.colour, width: 1.4, points: { show: false }, value: (_: uPlot, value: number | null) => (value == null ? "" : value.toPrecision(3)) })),
     ],
   };
 }

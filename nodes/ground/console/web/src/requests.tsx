@@ -3,10 +3,10 @@
 import { computed, signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { get, post, told, tellOutcomes, type Opportunity, type Outcome, type Report } from "./api";
-import { inView, view } from "./map";
-import { lookOf, STATES } from "./states";
-import { focus, info, select, selected, shown, version, world } from "./store";
-import { clock, duration, stamp } from "./time";
+import { inView, reveal, view } from "./map";
+import { ACCEPTED, HELD, lookOf, STATES } from "./states";
+import { draft, drawn, focus, info, panel, replaced, select, selected, shown, version, world } from "./store";
+import { clock, stamp, window } from "./time";
 import type { ChangeFact } from "./facts";
 import type { Strip } from "./world";
 
@@ -42,11 +42,18 @@ const rows = computed<Row[]>(() => {
   return found;
 });
 
+/** Shows the requests in one state. */
+export function onlyState(wanted: number): void {
+  panel.value = "requests";
+  text.value = "";
+  state.value = wanted;
+}
+
 export function Requests() {
   return (
     <div class="requests">
       <Filters />
-      {info.value.live && <Actions />}
+      {info.value.commands && <Actions />}
       <Table />
       {focus.value > 0 && <Drawer id={focus.value} />}
     </div>
@@ -112,7 +119,9 @@ function Table() {
   const step = (by: number, more: boolean) => {
     const at = all.findIndex(({ strip }) => strip.id === focus.value);
     const next = all[Math.max(0, Math.min(all.length - 1, at + by))];
-    if (next) select(next.strip.id, more);
+    if (!next) return;
+    select(next.strip.id, more);
+    reveal(next.strip);
   };
   return (
     <div
@@ -143,11 +152,6 @@ function Table() {
   );
 }
 
-function countdown(change: ChangeFact, t: number): string {
-  if (!change.close_ms || change.close_ms < t) return "–";
-  return change.open_ms > t ? `in ${duration(change.open_ms - t)}` : `closes ${duration(change.close_ms - t)}`;
-}
-
 function Line({ strip, change, top }: Row & { top: number }) {
   const look = lookOf(change.state);
   return (
@@ -155,13 +159,16 @@ function Line({ strip, change, top }: Row & { top: number }) {
       class={selected.value.has(strip.id) ? "row selected" : "row"}
       role="row"
       style={{ top: `${top}px` }}
-      onClick={(event) => select(strip.id, event.ctrlKey || event.shiftKey)}
+      onClick={(event) => {
+        select(strip.id, event.ctrlKey || event.shiftKey);
+        reveal(strip);
+      }}
     >
       <span role="gridcell">{strip.id}</span>
       <span role="gridcell" title={strip.name}>{strip.name}</span>
       <span role="gridcell" style={{ color: look.colour }}>{look.name}</span>
       <span role="gridcell">{strip.priority.toFixed(2)}</span>
-      <span role="gridcell">{countdown(change, shown.value)}</span>
+      <span role="gridcell">{change.close_ms > shown.value ? window(change.open_ms, change.close_ms, shown.value) : "–"}</span>
       <span role="gridcell">{change.attempts}</span>
       <span role="gridcell" title={change.reason}>{change.reason}</span>
     </div>
@@ -185,32 +192,73 @@ function Drawer({ id }: { id: number }) {
     <aside class="drawer" aria-label={`strip ${id}`}>
       <header>
         <b>{id} {strip.name}</b>
+        <span style={{ color: lookOf(change.state).colour }}>{lookOf(change.state).name}</span>
+        <span class="space" />
+        {info.value.commands && (
+          <>
+            <button onClick={() => again(strip, 0)}>clone</button>
+            <button disabled={change.state !== ACCEPTED && change.state !== HELD} onClick={() => again(strip, id)}>replace</button>
+          </>
+        )}
         <button aria-label="close" onClick={() => select(0)}>×</button>
       </header>
-      <p>
-        {lookOf(change.state).name}{change.reason && `: ${change.reason} (reason ${change.reason_code})`} · priority {strip.priority} ·{" "}
-        {strip.speed_m_s} m/s · by {strip.submitter || "–"} {link("twin", strip.linked_to)} {link("replaces", strip.supersedes)}{" "}
-        {link("replaced by", change.superseded_by)}
-      </p>
-      <p>
-        from {strip.start[1].toFixed(3)}, {strip.start[0].toFixed(3)} to {strip.end[1].toFixed(3)}, {strip.end[0].toFixed(3)}
-      </p>
+      {change.reason && <p class="why">{change.reason} <span class="dim">(reason {change.reason_code})</span></p>}
+      <dl>
+        <dt>priority</dt><dd>{strip.priority.toFixed(2)}</dd>
+        <dt>speed</dt><dd>{strip.speed_m_s.toFixed(0)} m/s</dd>
+        <dt>attempts</dt><dd>{change.attempts}</dd>
+        <dt>by</dt><dd>{strip.submitter || "–"}{strip.client_ref && ` · ${strip.client_ref}`}</dd>
+        <dt>from</dt><dd>{place(strip.start)}</dd>
+        <dt>to</dt><dd>{place(strip.end)}</dd>
+      </dl>
+      <p>{link("twin", strip.linked_to)} {link("replaces", strip.supersedes)} {link("replaced by", change.superseded_by)}</p>
       <table>
         <thead><tr><th>when</th><th>state</th><th>who</th><th>why</th></tr></thead>
         <tbody>
           {history.map((it) => (
-            <tr key={it.n}><td>{stamp(it.t)}</td><td>{lookOf(it.state).name}</td><td>{it.actor}</td><td>{it.reason}</td></tr>
+            <tr key={it.n}><td class="number" title={stamp(it.t)}>{stamp(it.t).slice(5)}</td><td>{lookOf(it.state).name}</td><td>{it.actor}</td><td>{it.reason}</td></tr>
           ))}
         </tbody>
       </table>
+      {report && report.attempts.length > 0 && <Attempts list={report.attempts} />}
       {report && <Opportunities list={report.opportunities} />}
     </aside>
   );
 }
 
+const place = ([lon, lat]: [number, number]) =>
+  `${Math.abs(lat).toFixed(3)}° ${lat < 0 ? "S" : "N"}, ${Math.abs(lon).toFixed(3)}° ${lon < 0 ? "W" : "E"}`;
+
+/** Fills a new strip with what a known one is. */
+function again(strip: Strip, id: number): void {
+  drawn.value = [strip.start, strip.end];
+  draft.value = { name: strip.name, priority: strip.priority, speed: strip.speed_m_s, hold: false, both: strip.linked_to > 0 };
+  replaced.value = id;
+  panel.value = "submit";
+}
+
+function Attempts({ list }: { list: Report["attempts"] }) {
+  return (
+    <table>
+      <thead><tr><th>attempt</th><th>began</th><th>error</th><th>elevation</th><th>reward</th></tr></thead>
+      <tbody>
+        {list.map((it) => (
+          <tr key={it.task}>
+            <td>task {it.task}</td>
+            <td>{clock(world.value.time(it.start))}</td>
+            <td class="number">{it.max_error.toFixed(4)}</td>
+            <td class="number">{it.min_elevation_deg.toFixed(1)}°</td>
+            <td class="number">{it.reward.toFixed(2)}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
 /** When a strip can be imaged, with what it would take. */
 export function Opportunities({ list }: { list: readonly Opportunity[] }) {
-  if (!list.length) return <p>no opportunity is left</p>;
+  if (!list.length) return <p class="dim">no opportunity is left</p>;
   return (
     <table>
       <thead><tr><th>opens</th><th>closes</th><th>elevation</th><th>slew</th><th>conflicts</th></tr></thead>
@@ -220,7 +268,7 @@ export function Opportunities({ list }: { list: readonly Opportunity[] }) {
             <td>{stamp(it.open_ms)}</td>
             <td>{clock(it.close_ms)}</td>
             <td>{it.min_elevation_deg.toFixed(1)}°</td>
-            <td>{it.transition_ticks === null ? "–" : `${it.transition_ticks} ticks`}</td>
+            <td>{it.transition_ticks === null ? "–" : `${((it.transition_ticks * world.value.tick_ms) / 1000).toFixed(1)} s`}</td>
             <td title={it.conflict_ids.join(", ")}>{it.conflicts}</td>
           </tr>
         ))}

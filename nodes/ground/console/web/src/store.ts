@@ -9,13 +9,23 @@ export interface Info {
   title: string;
   run: string;
   elevation_min_deg: number;
+  /** Name of the token; none on the server's own machine. */
+  caller: string | null;
+  /** Whether whoever looks may command. */
+  commands: boolean;
 }
 
 export const world = signal(new World());
 /** Counts what came in; whoever shows the world reads it. */
 export const version = signal(0);
-export const info = signal<Info>({ live: false, title: "", run: "", elevation_min_deg: 0 });
+export const info = signal<Info>({ live: false, title: "", run: "", elevation_min_deg: 0, caller: null, commands: false });
 export const connected = signal(false);
+/** Whether the server wants a token. */
+export const locked = signal(false);
+/** Wall-clock time at which something was heard last [ms]. */
+export const heard = signal(0);
+/** Wall-clock time, every second [ms]. */
+export const wall = signal(Date.now());
 /** A time that is looked at instead of now [ms]. */
 export const cursor = signal<number | null>(null);
 export const selected = signal<ReadonlySet<number>>(new Set());
@@ -24,6 +34,12 @@ export const focus = signal(0);
 /** Whether clicks on the map draw a strip. */
 export const drawing = signal(false);
 export const drawn = signal<[number, number][]>([]);
+/** Name of the panel that is open. */
+export const panel = signal("requests");
+/** The strip that what is submitted replaces; 0 for none. */
+export const replaced = signal(0);
+/** What a new strip is filled with. */
+export const draft = signal({ name: "", priority: 0.5, speed: 3000, hold: false, both: false });
 /** What the page has to say to who uses it. */
 export const message = signal("");
 
@@ -45,6 +61,7 @@ export const span = computed<[number, number]>(() => {
 export function take(facts: readonly Fact[]): void {
   batch(() => {
     for (const fact of facts) world.value.take(fact);
+    heard.value = Date.now();
     version.value += 1;
   });
 }

@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { post, told, tellOutcomes, type Outcome, type Preview } from "./api";
 import { Opportunities } from "./requests";
-import { drawing, drawn, message } from "./store";
+import { draft, drawing, drawn, message, panel, replaced, select } from "./store";
 
 interface Feature {
   type: "Feature";
@@ -17,11 +17,6 @@ const LARGEST = 20e6;
 const file = signal<{ name: string; text: string } | null>(null);
 const previews = signal<Preview[] | null>(null);
 const busy = signal(false);
-const name = signal("");
-const priority = signal(0.5);
-const speed = signal(3000);
-const hold = signal(false);
-const both = signal(false);
 
 /** What is to be submitted, as GeoJSON; nothing without a file or a strip. */
 function order(): { name: string; geojson: unknown } | undefined {
@@ -37,12 +32,12 @@ function order(): { name: string; geojson: unknown } | undefined {
   const feature: Feature = {
     type: "Feature",
     properties: {
-      name: name.value || "drawn",
+      name: draft.value.name || "drawn",
       client_ref: `console-${Date.now()}`,
-      priority: priority.value,
-      acquisition_speed_m_s: speed.value,
-      hold_for_approval: hold.value,
-      bidirectional: both.value,
+      priority: draft.value.priority,
+      acquisition_speed_m_s: draft.value.speed,
+      hold_for_approval: draft.value.hold,
+      bidirectional: draft.value.both,
     },
     geometry: { type: "LineString", coordinates: drawn.value.map(([lon, lat]) => [lon, lat]) },
   };
@@ -61,14 +56,27 @@ async function submit(): Promise<void> {
   const body = order();
   if (!body) return;
   busy.value = true;
-  const outcomes = await told(post<Outcome[]>("/api/strips", body));
+  const old = replaced.value;
+  const answer = old ? post<Outcome>(`/api/strips/${old}/replace`, body).then((it) => [it]) : post<Outcome[]>("/api/strips", body);
+  const outcomes = await told(answer);
   busy.value = false;
   if (!outcomes) return;
-  tellOutcomes("accepted", outcomes);
+  tellOutcomes(old ? `in the place of ${old}` : "accepted", outcomes);
+  leave();
+  const first = outcomes.find((it) => it.accepted);
+  if (first) {
+    panel.value = "requests";
+    select(first.id);
+  }
+}
+
+/** Leaves what was to be submitted. */
+function leave(): void {
   previews.value = null;
   file.value = null;
   drawn.value = [];
   drawing.value = false;
+  replaced.value = 0;
 }
 
 async function take(given: File | undefined): Promise<void> {
@@ -79,6 +87,7 @@ async function take(given: File | undefined): Promise<void> {
   }
   file.value = { name: given.name, text: await given.text() };
   drawn.value = [];
+  replaced.value = 0;
   await preview();
 }
 
@@ -93,19 +102,24 @@ export function Submit() {
         void take(event.dataTransfer?.files[0]);
       }}
     >
-      <p>
-        <button aria-pressed={drawing.value} onClick={() => (drawing.value = !drawing.value)}>draw on the map</button> two clicks, start and
-        end; or drop a GeoJSON file here, or{" "}
-        <input type="file" aria-label="GeoJSON file" accept=".json,.geojson" onChange={(event) => void take(event.currentTarget.files?.[0])} />
-      </p>
-      {file.value ? <p>{file.value.name} <button onClick={() => (file.value = null)}>leave it</button></p> : <Drawn />}
-      <p>
+      <div class="actions">
+        <button aria-pressed={drawing.value} onClick={() => (drawing.value = !drawing.value)}>draw on the map</button>
+        <label class="file">
+          choose a GeoJSON file
+          <input type="file" aria-label="GeoJSON file" accept=".json,.geojson" onChange={(event) => void take(event.currentTarget.files?.[0])} />
+        </label>
+        <span class="dim">or drop one here</span>
+      </div>
+      {replaced.value > 0 && <p>in the place of strip <b>{replaced.value}</b></p>}
+      {file.value ? <p><b>{file.value.name}</b></p> : <Drawn />}
+      <div class="actions">
         <button disabled={!ready} onClick={() => void preview()}>opportunities</button>
-        <button disabled={!ready} class="primary" onClick={() => void submit()}>submit</button>
-        {busy.value && " …"}
-      </p>
+        <button disabled={!ready} class="primary" onClick={() => void submit()}>{replaced.value ? "replace" : "submit"}</button>
+        {ready && <button onClick={leave}>leave it</button>}
+        {busy.value && <span role="status">…</span>}
+      </div>
       {previews.value?.map((it, i) => (
-        <section key={i}>
+        <section key={i} class="preview">
           <h3>{it.name}</h3>
           {it.reason_code ? <p class="refused">would be refused: {it.reason} (reason {it.reason_code})</p> : <Opportunities list={it.opportunities} />}
         </section>
@@ -115,6 +129,8 @@ export function Submit() {
 }
 
 function Drawn() {
+  const { name, priority, speed, hold, both } = draft.value;
+  const change = (part: Partial<typeof draft.value>) => (draft.value = { ...draft.value, ...part });
   const coordinate = (end: number, axis: 0 | 1, label: string, limit: number) => (
     <label>
       {label}
@@ -136,12 +152,13 @@ function Drawn() {
   return (
     <fieldset>
       <legend>strip</legend>
-      {coordinate(0, 1, "from lat", 90)} {coordinate(0, 0, "lon", 180)} {coordinate(1, 1, "to lat", 90)} {coordinate(1, 0, "lon", 180)}
-      <label>name <input value={name.value} maxLength={100} onInput={(event) => (name.value = event.currentTarget.value)} /></label>
-      <label>priority <input type="number" min={0} max={1} step={0.05} value={priority.value} onInput={(event) => (priority.value = Number(event.currentTarget.value))} /></label>
-      <label>speed [m/s] <input type="number" step={100} value={speed.value} onInput={(event) => (speed.value = Number(event.currentTarget.value))} /></label>
-      <label><input type="checkbox" checked={hold.value} onChange={(event) => (hold.value = event.currentTarget.checked)} /> hold for approval</label>
-      <label><input type="checkbox" checked={both.value} onChange={(event) => (both.value = event.currentTarget.checked)} /> either direction</label>
+      <span>{coordinate(0, 1, "from lat", 90)} {coordinate(0, 0, "lon", 180)}</span>
+      <span>{coordinate(1, 1, "to lat", 90)} {coordinate(1, 0, "lon", 180)}</span>
+      <label>name <input value={name} maxLength={100} onInput={(event) => change({ name: event.currentTarget.value })} /></label>
+      <label>priority <input type="number" min={0} max={1} step="any" value={priority} onInput={(event) => change({ priority: Number(event.currentTarget.value) })} /></label>
+      <label>speed [m/s] <input type="number" step="any" value={speed} onInput={(event) => change({ speed: Number(event.currentTarget.value) })} /></label>
+      <label><input type="checkbox" checked={hold} onChange={(event) => change({ hold: event.currentTarget.checked })} /> hold for approval</label>
+      <label><input type="checkbox" checked={both} onChange={(event) => change({ both: event.currentTarget.checked })} /> either direction</label>
     </fieldset>
   );
 }

@@ -18,3 +18,9 @@ export function duration(ms: number): string {
   const text = `${Math.floor(seconds / 3600)}:${pad(Math.floor(seconds / 60) % 60)}:${pad(seconds % 60)}`;
   return ms < 0 ? `−${text}` : text;
 }
+
+/** How a window stands at a time: when it opens or closes. */
+export function window(open: number, close: number, t: number): string {
+  if (!close || close < t) return close ? "over" : "–";
+  return open > t ? `in ${duration(open - t)}` : `closes ${duration(close - t)}`;
+}

@@ -10,8 +10,10 @@ import { lastAt, type Task, type World } from "./world";
 /** Width of the names of bands, and of the plots' axes [px]. */
 export const GUTTER = 78;
 const ROW = 22;
-const BANDS = ["tasks", "offered", "selected", "alarms"];
-const HEIGHT = BANDS.length * ROW + 20;
+/** Where bands begin, and how high each is [px]: of windows there are many. */
+const BANDS = { tasks: [0, ROW], windows: [ROW, 42], selected: [ROW + 42, ROW], alarms: [2 * ROW + 42, ROW] } as const;
+type Band = keyof typeof BANDS;
+const HEIGHT = 3 * ROW + 42 + 20;
 
 interface Scene {
   context: CanvasRenderingContext2D;
@@ -19,12 +21,14 @@ interface Scene {
   width: number;
 }
 
-function bar({ context, x }: Scene, row: number, from: number, to: number, colour: string, hollow = false): void {
+function bar({ context, x }: Scene, band: Band, from: number, to: number, colour: string, hollow = false): void {
   const [left, wide] = [Math.max(GUTTER, x(from)), Math.max(2, x(to) - Math.max(GUTTER, x(from)))];
   if (x(to) < GUTTER) return;
+  const [top, high] = BANDS[band];
   context.fillStyle = context.strokeStyle = colour;
-  if (hollow) context.strokeRect(left + 0.5, row * ROW + 4.5, wide - 1, ROW - 9);
-  else context.fillRect(left, row * ROW + 4, wide, ROW - 8);
+  context.lineWidth = 1;
+  if (hollow) context.strokeRect(left + 0.5, top + 4.5, wide - 1, high - 9);
+  else context.fillRect(left, top + 4, wide, high - 8);
 }
 
 function tasks(scene: Scene, now: World, t: number): void {
@@ -35,30 +39,70 @@ function tasks(scene: Scene, now: World, t: number): void {
     const end = now.time(task.end ?? task.start + task.t_pre + task.rest);
     if (scene.x(end) < GUTTER || scene.x(start) > scene.width) continue;
     if (!task.strip) {
-      bar(scene, 0, start, end, "#3a4a5a");
+      bar(scene, "tasks", start, end, "#3a4a5a");
       continue;
     }
     const failed = task.result && !task.result.success && end <= t;
-    const colour = selected.value.has(task.strip) ? "#ff00ff" : failed ? "#d55e00" : task.result && end <= t ? "#009e73" : "#f0e442";
-    bar(scene, 0, start, Math.min(turn, end), `${colour}66`);
-    if (end > turn) bar(scene, 0, turn, end, colour, Boolean(failed));
+    const colour = selected.value.has(task.strip) ? "#ff00ff" : failed ? "#d55e00" : task.result && end <= t ? "#17b88a" : "#f0e442";
+    bar(scene, "tasks", start, Math.min(turn, end), `${colour}66`);
+    if (end > turn) bar(scene, "tasks", turn, end, colour, Boolean(failed));
+    label(scene, turn, end, now.strips.get(task.strip)?.name ?? "");
   }
 }
 
-function windows(scene: Scene, now: World, t: number): void {
+/** A name on a bar, where there is room for it. */
+function label({ context, x }: Scene, from: number, to: number, text: string): void {
+  const left = Math.max(GUTTER, x(from));
+  const room = x(to) - left - 6;
+  if (room < 24) return;
+  context.save();
+  context.beginPath();
+  context.rect(left, 0, room + 3, ROW);
+  context.clip();
+  context.fillStyle = "#06110d";
+  context.font = "10px system-ui, sans-serif";
+  context.fillText(text, left + 3, 14.5);
+  context.restore();
+}
+
+/** The windows of the strips that the planner may choose among, each a line, and which was chosen. */
+function offered(scene: Scene, now: World, t: number): void {
   const offer = lastAt(now.offers, t);
-  for (const { strip, open, close } of offer?.candidates ?? []) {
-    bar(scene, 1, now.time(open), now.time(close), selected.value.has(strip) ? "#ff00ff88" : "#56b4e944");
-  }
+  if (!offer) return;
+  const choice = now.choices.get(offer.task);
+  const chosen = choice && choice.t <= t ? choice.candidates[choice.chosen] : undefined;
+  const [top, high] = BANDS.windows;
+  const step = Math.min(4, (high - 4) / Math.max(1, offer.candidates.length));
+  const { context, x } = scene;
+  offer.candidates.forEach(({ strip, open, close }, i) => {
+    const left = Math.max(GUTTER, x(now.time(open)));
+    if (x(now.time(close)) < GUTTER) return;
+    context.fillStyle = selected.value.has(strip) ? "#ff00ff" : strip === chosen ? "#f0e442" : "#56b4e9a0";
+    context.fillRect(left, top + 2 + i * step, Math.max(2, x(now.time(close)) - left), Math.max(0.8, step - 0.6));
+  });
+}
+
+/** A proposal that waits for an operator: until when it can be flown, and when it is decided without one. */
+function proposal(scene: Scene, now: World, t: number): void {
+  const status = lastAt(now.planner, t);
+  if (!status || status.proposal_state !== "open") return;
+  bar(scene, "tasks", t, now.time(status.close), "#e69f0055");
+  bar(scene, "tasks", t, now.time(status.close), "#e69f00", true);
+  label(scene, t, now.time(status.close), `approve ${status.name}?`);
+  if (status.deadline) bar(scene, "tasks", now.time(status.deadline), now.time(status.deadline), "#ff8a7a");
+}
+
+function windows(scene: Scene, now: World, t: number): void {
+  offered(scene, now, t);
   for (const id of selected.value) {
     const strip = now.strips.get(id);
     const change = strip && now.changeAt(strip, t);
     if (!change) continue;
-    if (change.close_ms) bar(scene, 2, change.open_ms, change.close_ms, lookOf(change.state).colour);
-    if (change.imaging_ms) bar(scene, 2, change.imaging_ms, change.imaging_ms + 1000, "#ffffff");
+    if (change.close_ms) bar(scene, "selected", change.open_ms, change.close_ms, lookOf(change.state).colour);
+    if (change.imaging_ms) bar(scene, "selected", change.imaging_ms, change.imaging_ms + 1000, "#ffffff");
   }
   for (const alarm of now.alarms.values()) {
-    if (alarm.t <= t) bar(scene, 3, alarm.t, alarm.t + 1000, alarm.level > 1 ? "#ff5050" : "#e69f00");
+    if (alarm.t <= t) bar(scene, "alarms", alarm.t, alarm.t + 1000, alarm.level > 1 ? "#ff5050" : "#e69f00");
   }
 }
 
@@ -89,11 +133,17 @@ function draw(canvas: HTMLCanvasElement): void {
   marks(scene, [from, to]);
   const [now, t] = [world.value, shown.value];
   tasks(scene, now, t);
+  proposal(scene, now, t);
   windows(scene, now, t);
   context.fillStyle = "#0d141b";
   context.fillRect(0, 0, GUTTER - 2, HEIGHT);
   context.fillStyle = "#9fb4c7";
-  BANDS.forEach((name, row) => context.fillText(name, 6, row * ROW + 15));
+  for (const [name, [top, high]] of Object.entries(BANDS)) {
+    context.fillText(name, 6, top + 15);
+    context.fillStyle = "#1b2b3a";
+    context.fillRect(0, top + high - 0.5, width, 0.5);
+    context.fillStyle = "#9fb4c7";
+  }
   context.fillStyle = cursor.value === null ? "#ffffff" : "#ff00ff";
   if (x(t) >= GUTTER) context.fillRect(x(t), 0, 1.5, HEIGHT);
 }
@@ -197,7 +247,7 @@ export function TimeBar() {
         value={t}
         onInput={(event) => look(Number(event.currentTarget.value))}
       />
-      <span class="task">{phase ? `${phase} ${strip?.name ?? ""} · ${duration(left)}` : ""}</span>
+      <span class="task">{phase && <><b>{phase}</b> {strip?.name ?? ""} <span class="number">{duration(left)}</span></>}</span>
     </div>
   );
 }

@@ -22,6 +22,10 @@ export interface Task {
 export interface Alarm extends f.AlarmFact {
   acknowledged: boolean;
   count: number;
+  /** Who has seen it. */
+  by: string;
+  /** Until when and why it is put aside. */
+  aside?: f.ShelvedFact;
 }
 
 /** The last of a list that is ordered by time which was true at `t`. */
@@ -58,6 +62,9 @@ export class World {
   readonly refused: f.RefusedFact[] = [];
   readonly alarms = new Map<number, Alarm>();
   nodes: f.NodesFact | undefined;
+  /** Nodes that have been there, and how often each has come back. */
+  readonly seen = new Set<string>();
+  readonly restarts = new Map<string, number>();
 
   take(fact: f.Fact): void {
     if (fact.t > 0) {
@@ -119,17 +126,28 @@ export class World {
         break;
       case "alarm":
         this.alarms.set(fact.alarm, {
+          ...this.alarms.get(fact.alarm),
           ...fact,
           acknowledged: false,
+          by: "",
           count: (this.alarms.get(fact.alarm)?.count ?? 0) + 1,
         });
         break;
       case "acknowledged": {
         const alarm = this.alarms.get(fact.alarm);
-        if (alarm) alarm.acknowledged = true;
+        if (alarm) Object.assign(alarm, { acknowledged: true, by: fact.actor });
+        break;
+      }
+      case "shelved": {
+        const alarm = this.alarms.get(fact.alarm);
+        if (alarm) alarm.aside = fact;
         break;
       }
       case "nodes":
+        for (const name of this.nodes?.missing ?? []) {
+          if (fact.present.includes(name) && this.seen.has(name)) this.restarts.set(name, (this.restarts.get(name) ?? 0) + 1);
+        }
+        fact.present.forEach((name) => this.seen.add(name));
         this.nodes = fact;
         break;
     }
@@ -149,6 +167,11 @@ export class World {
   /** How a request stood at a time; nothing before it was asked for. */
   changeAt(strip: Strip, t: number): f.ChangeFact | undefined {
     return lastAt(strip.changes, t);
+  }
+
+  /** Whether an alarm counts at a time: nobody has seen it, and it is not put aside. */
+  stands(alarm: Alarm, t: number): boolean {
+    return !alarm.acknowledged && (alarm.aside?.until_ms ?? 0) <= t;
   }
 
   /** The task that was flown at a time. */

@@ -43,7 +43,7 @@ test("a task that ended keeps what was planned", () => {
 
 test("an alarm that is raised again stands again", () => {
   const alarm = { kind: "alarm" as const, alarm: 1, name: "guidance: late", level: 1, text: "late" };
-  const world = worldOf({ n: 1, t: 10, ...alarm }, { n: 2, t: 20, kind: "acknowledged", alarm: 1 });
+  const world = worldOf({ n: 1, t: 10, ...alarm }, { n: 2, t: 20, kind: "acknowledged", alarm: 1, actor: "console" });
   expect(world.alarms.get(1)!.acknowledged).toBe(true);
   world.take({ n: 3, t: 30, ...alarm });
   expect(world.alarms.get(1)).toMatchObject({ acknowledged: false, count: 2 });
@@ -52,4 +52,22 @@ test("an alarm that is raised again stands again", () => {
 test("nothing was true before the first", () => {
   expect(lastAt([{ t: 5 }, { t: 6 }], 4)).toBeUndefined();
   expect(lastAt([{ t: 5 }, { t: 6 }], 6)).toEqual({ t: 6 });
+});
+
+test("an alarm that is put aside does not count until its time is over", () => {
+  const alarm = { kind: "alarm" as const, alarm: 1, name: "guidance: late", level: 1, text: "late" };
+  const world = worldOf(
+    { n: 1, t: 10, ...alarm },
+    { n: 2, t: 20, kind: "shelved", alarm: 1, until_ms: 100, actor: "console", reason: "known" },
+    { n: 3, t: 30, ...alarm },
+  );
+  const known = world.alarms.get(1)!;
+  expect([30, 99, 100].map((t) => world.stands(known, t))).toEqual([false, false, true]);
+  expect(known).toMatchObject({ count: 2, aside: { reason: "known" } });
+});
+
+test("a node that was there, is missing and comes back has been restarted", () => {
+  const nodes = (n: number, present: string[], missing: string[]): Fact => ({ n, t: n, kind: "nodes", present, missing });
+  const world = worldOf(nodes(1, [], ["planner"]), nodes(2, ["planner"], []), nodes(3, [], ["planner"]), nodes(4, ["planner"], []));
+  expect(world.restarts.get("planner")).toBe(1);
 });
