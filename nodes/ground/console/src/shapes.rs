@@ -33,7 +33,7 @@ pub fn bbox(strips: &[Ends]) -> [f64; 4] {
     let least = |at: usize| places().map(|it| it[at]).fold(f64::INFINITY, f64::min);
     let greatest = |at: usize| places().map(|it| it[at]).fold(f64::NEG_INFINITY, f64::max);
     let (south, north) = (least(1), greatest(1));
-    if strips.iter().any(|ends| crosses(ends)) {
+    if strips.iter().any(crosses) {
         let east_of = |lon: f64| if lon < 0.0 { lon + 360.0 } else { lon };
         let west = places().map(|it| east_of(it[0])).fold(f64::INFINITY, f64::min);
         let east = places().map(|it| east_of(it[0])).fold(f64::NEG_INFINITY, f64::max);

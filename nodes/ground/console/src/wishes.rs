@@ -132,7 +132,7 @@ pub async fn get(counter: &Counter, id: u64) -> Result<msg::StripReport, Problem
     let request = msg::GetStripRequest { id, ..Default::default() };
     let answer = counter.ask(move |desks| call(&desks.get, &request)).await?;
     let unknown = || Problem::unknown(format!("{} (reason {})", answer.reason, answer.reason_code));
-    answer.report.iter().next().cloned().ok_or_else(unknown)
+    answer.report.first().cloned().ok_or_else(unknown)
 }
 
 fn whole(results: Vec<msg::SubmitResult>, reason_code: u16, reason: &str) -> Result<Vec<msg::SubmitResult>, Problem> {
