@@ -9,7 +9,9 @@ use crate::planner::{Decision, DecisionContext, Planner, PlannerError, Shield};
 use crate::requests::catalogue::Candidate;
 use crate::task::{Duty, SettledTask, TaskRecord};
 use crate::time::Tick;
+use crate::vehicle::executive::Executive;
 use crate::vehicle::flight::{Flight, Situation};
+use crate::vehicle::health::Health;
 use crate::vehicle::resources::{Failure, Onboard};
 
 /// Whoever keeps the requests of a mission.
@@ -117,6 +119,23 @@ impl<K: RequestKeeper> Mission<K> {
         &self.model
     }
 
+    /// The satellite in flight.
+    #[must_use]
+    pub fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.flight.take_changes()
+    }
+
+    /// Time from a situation to the start of the task decided on it [ticks].
+    #[must_use]
+    pub fn planning_delay(&self) -> u32 {
+        self.planning_delay
+    }
+
     /// Whoever keeps the requests.
     #[must_use]
     pub fn keeper(&self) -> &K {
@@ -160,14 +179,48 @@ impl<K: RequestKeeper> Mission<K> {
     /// # Errors
     /// When the decision is not one that the context allows; nothing is flown then.
     pub fn fly(&mut self, decision: Decision, until: Tick) -> Result<SettledTask, PlannerError> {
+        self.fly_after(decision, self.planning_delay, until)
+    }
+
+    /// Flies one task that begins after `delay` ticks, cut short at `until`.
+    ///
+    /// # Errors
+    /// When the decision is not one that the context allows; nothing is flown then.
+    pub fn fly_after(&mut self, decision: Decision, delay: u32, until: Tick) -> Result<SettledTask, PlannerError> {
         let task = decision.to_task(&self.context())?;
-        let record = self.flight.fly_number(self.task, task, self.planning_delay, until);
+        let record = self.flight.fly_number(self.task, task, delay, until);
+        Ok(self.settled(record))
+    }
+
+    /// Flies one task, in which guidance is lost at `lost`, which is not after the task's end; see [`Flight::fly_lost`].
+    ///
+    /// # Errors
+    /// When the decision is not one that the context allows; nothing is flown then.
+    pub fn fly_lost(
+        &mut self,
+        decision: Decision,
+        delay: u32,
+        (lost, back): (Tick, Tick),
+        executive: Executive,
+    ) -> Result<SettledTask, PlannerError> {
+        let task = decision.to_task(&self.context())?;
+        let record = self.flight.fly_lost(self.task, task, delay, lost, back, executive);
+        Ok(self.settled(record))
+    }
+
+    /// Flies without guidance until `back`; `executive` takes over then.
+    pub fn without_guidance(&mut self, back: Tick, executive: Executive) {
+        self.flight.without_guidance(back, executive);
+        self.refresh();
+    }
+
+    fn settled(&mut self, record: TaskRecord) -> SettledTask {
         let reward = self.keeper.settle(&record);
         self.settle_resources(&record, reward);
         self.task += 1;
         self.previous = Some(record.clone());
         self.refresh();
-        Ok(SettledTask { record, reward })
+        SettledTask { record, reward }
     }
 
     /// Decides and flies one task, cut short at `until` and at the mission's end; nothing once it is over.

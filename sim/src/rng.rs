@@ -14,6 +14,8 @@ pub const CATALOGUE: u64 = 1;
 pub const SENSORS: u64 = 3;
 /// Stream of the times at which requests come in flight.
 pub const ARRIVALS: u64 = 4;
+/// Stream of the faults that a mission leaves to its seed.
+pub const FAULTS: u64 = 5;
 
 /// First of the streams of a planner that draws at random, one for each task; all other streams lie below it.
 const PLANNER: u64 = 1 << 32;
@@ -41,7 +43,7 @@ mod tests {
     #[test]
     fn no_task_of_a_planner_draws_what_something_else_draws() {
         let first = |mut rng: Rng| rng.random::<u64>();
-        let fixed = [INITIAL_STATE, CATALOGUE, SENSORS, ARRIVALS].map(|number| first(stream(7, number)));
+        let fixed = [INITIAL_STATE, CATALOGUE, SENSORS, ARRIVALS, FAULTS].map(|number| first(stream(7, number)));
         for task in 0..100 {
             assert!(!fixed.contains(&first(planner(7, task))), "task {task}");
         }

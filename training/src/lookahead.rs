@@ -105,6 +105,14 @@ impl Planner for PolicyLookahead {
         format!("{}+lookahead", self.learned.name())
     }
 
+    fn forget(&mut self) {
+        self.experience.forget();
+    }
+
+    fn minds_wheels(&self) -> bool {
+        true
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> std::result::Result<Decision, PlannerError> {
         self.judgement = None;
         let allowance = self.experience.learn(context);

@@ -1,4 +1,4 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|wheel|soak|ament|web`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|chaos|wheel|web|soak|ament`.
 
 mod ament;
 mod bench;
@@ -35,6 +35,9 @@ usage: cargo xtask COMMAND
                    that all of them are used; builds the tools that are missing
   bench            run every crate's measurements and print one JSON object
   wheel            build the Python package into target/wheels
+  chaos [--first SEED] --seeds N
+                   fly N missions whose faults are drawn from their seeds, check what
+                   must hold whatever fails, and print what repeats a failure
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
@@ -68,6 +71,7 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("lint") => lint(&root, rest),
         Some("bench") => bench(&root, rest),
         Some("wheel") => wheel(&root, rest),
+        Some("chaos") => chaos(&root, rest),
         Some("soak") => soak(&root, rest),
         Some("web") => web(&root, rest),
         Some("ament") => ament(&root, rest),
@@ -155,6 +159,22 @@ fn lint(root: &Path, args: &[OsString]) -> Result<()> {
     }
     setup(root, false)?;
     lint::run(root)
+}
+
+/// Missions in one process need neither torch nor Python: nothing is set up.
+fn chaos(root: &Path, args: &[OsString]) -> Result<()> {
+    let words: Option<Vec<&str>> = args.iter().map(|word| word.to_str()).collect();
+    let (first, count) = match words.as_deref() {
+        Some(["--seeds", count]) => ("0", *count),
+        Some(["--first", first, "--seeds", count] | ["--seeds", count, "--first", first]) => (*first, *count),
+        _ => bail!("chaos takes --seeds N, and --first SEED\n\n{USAGE}"),
+    };
+    for (name, text) in [("--first", first), ("--seeds", count)] {
+        text.parse::<u64>().with_context(|| format!("{name} {text} is no whole number"))?;
+    }
+    let mut cargo = process::cargo(root, "run");
+    cargo.args(["--quiet", "--release", "--package", "swath-mission", "--example", "chaos", "--", first, count]);
+    Err(process::become_command(&mut cargo))
 }
 
 fn soak(root: &Path, args: &[OsString]) -> Result<()> {

@@ -136,6 +136,12 @@ impl Gate {
         self.proposal.as_ref()
     }
 
+    /// Withdraws what is proposed and forgets what was skipped; the mode stays.
+    pub fn forget(&mut self) {
+        self.close("withdrawn: the planner was started again");
+        self.skipped.clear();
+    }
+
     /// What became of the proposal before, in words.
     #[must_use]
     pub fn last_outcome(&self) -> &str {
@@ -287,6 +293,19 @@ impl Planner for GatedPlanner {
         // The guarded planner's decisions are allowed ones: the heuristic waits when nothing else is left.
         let plan = |left: &[Candidate]| planner.decide(&DecisionContext { candidates: left, ..*context });
         self.gate.decide(context.situation.now, context.candidates, plan)
+    }
+
+    fn forget(&mut self) {
+        self.gate.forget();
+        self.planner.forget();
+    }
+
+    fn replaced(&self) -> Option<&str> {
+        self.planner.replaced()
+    }
+
+    fn minds_wheels(&self) -> bool {
+        self.planner.minds_wheels()
     }
 
     fn rationale(&self) -> Option<Rationale> {

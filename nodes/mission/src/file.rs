@@ -14,12 +14,14 @@ use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::faults::{Fault as VehicleFault, TimedFault};
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
+use crate::faults::{FaultPlan, FaultPlanError};
 use crate::orders::cutting::{Cutting, SWATH_KM};
 use crate::orders::import::{Fault, RequestsFileError, import};
 use crate::orders::order::Order;
@@ -64,6 +66,9 @@ pub enum MissionError {
         /// Greatest value.
         max: f64,
     },
+    /// Faults that cannot be flown.
+    #[error("mission setting faults: {0}")]
+    Faults(#[from] FaultPlanError),
     /// A file of requests cannot be used.
     #[error(transparent)]
     Requests(#[from] RequestsFileError),
@@ -107,6 +112,9 @@ pub struct Mission {
     /// How the satellite that is flown differs from what guidance and planner believe of it.
     #[serde(skip_serializing_if = "is_exact")]
     pub plant: PlantErrors,
+    /// What fails on the way.
+    #[serde(skip_serializing_if = "FaultPlan::is_empty")]
+    pub faults: FaultPlan,
 }
 
 fn is_exact(plant: &PlantErrors) -> bool {
@@ -152,6 +160,7 @@ impl Default for Mission {
             sim: SimConfig::default(),
             resources: None,
             plant: PlantErrors::default(),
+            faults: FaultPlan::default(),
         }
     }
 }
@@ -208,14 +217,30 @@ impl Mission {
             scenario.validate()?;
         }
         self.plant.validate()?;
-        Ok(self.sim.validate()?)
+        self.sim.validate()?;
+        if !self.faults.is_empty() {
+            let model = self.model()?;
+            self.faults.validate(self.horizon(&model), model.period)?;
+        }
+        Ok(())
     }
 
-    /// The same mission with its initial state drawn, if it was left out.
+    /// The same mission with everything drawn that is left to its seed: initial state and faults.
     #[must_use]
     pub fn resolved(mut self) -> Self {
         self.initial = Some(self.initial());
+        if let Ok(model) = self.model() {
+            let horizon = self.horizon(&model);
+            self.faults = self.faults.resolved(self.seed, horizon, model.period);
+        }
         self
+    }
+
+    /// Whether what is measured of the satellite may differ from what is, now or later.
+    #[must_use]
+    pub fn tells_truth_apart(&self, period: TickPeriod) -> bool {
+        let of_sensors = |it: &TimedFault| matches!(it.fault, VehicleFault::GyroBias(_) | VehicleFault::StarTrackerOut);
+        self.plant.noisy() || self.faults.vehicle(period).iter().any(of_sensors)
     }
 
     /// The initial state.
@@ -224,13 +249,17 @@ impl Mission {
         self.initial.unwrap_or_else(|| InitialState::draw(&self.sim, &mut rng::stream(self.seed, rng::INITIAL_STATE)))
     }
 
-    /// The satellite at the epoch, with its errors.
+    /// The satellite at the epoch, with its errors and the faults that will befall it.
     ///
     /// # Errors
     /// When what the errors make of the configuration is out of range.
     pub fn spacecraft(&self, model: &Model) -> Result<Spacecraft, MissionError> {
         let mut spacecraft = Spacecraft::new(model, &self.initial());
         spacecraft.differ(model, &self.plant, self.seed)?;
+        let faults = self.faults.vehicle(model.period);
+        if !faults.is_empty() {
+            spacecraft.suffer(faults);
+        }
         Ok(spacecraft)
     }
 

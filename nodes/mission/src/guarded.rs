@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use swath_sim::planner::{Decision, DecisionContext, Heuristic, Planner, PlannerError, PlannerSpec, Rationale};
+use swath_sim::planner::{
+    Decision, DecisionContext, Heuristic, Lookahead, Planner, PlannerError, PlannerSpec, Rationale,
+};
+use swath_sim::vehicle::health::lost;
 
 /// Learned policies as a program links them. Programs hand this in, so that those which do not plan are not linked with
 /// what policies need.
@@ -20,17 +23,21 @@ pub struct Policies {
 /// Transition of the heuristic that takes over from a planner that fails [s].
 const FALLBACK_T_PRE_S: f64 = 90.0;
 
+/// Why a planner that does not fly its slews in its head does not decide any more.
+const WHEEL_LOST: &str = "a wheel is lost, and the planner does not know what the others can point at";
+
 /// The planner that takes over.
 const FALLBACK: Heuristic = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
 
 /// Who made the decisions of a mission: their numbers by name of the planner.
 pub type Deciders = BTreeMap<String, u64>;
 
-/// The decisions that the heuristic made in the place of the planner that was asked for.
+/// The decisions that another one made in the place of the planner that was asked for.
 #[must_use]
 pub fn made_instead(mut deciders: Deciders, asked_for: &PlannerSpec) -> Deciders {
-    let name = FALLBACK.name();
-    deciders.retain(|decider, _| *decider == name && asked_for.to_string() != name);
+    let asked_for = asked_for.to_string();
+    let others = [FALLBACK.name(), Lookahead::default().name()];
+    deciders.retain(|decider, _| others.contains(decider) && *decider != asked_for);
     deciders
 }
 
@@ -38,6 +45,10 @@ pub fn made_instead(mut deciders: Deciders, asked_for: &PlannerSpec) -> Deciders
 pub struct GuardedPlanner {
     /// None when it could not be made.
     planner: Option<Box<dyn Planner + Send>>,
+    /// Decides once a wheel is lost, where the planner does not know what is left to point with.
+    degraded: Lookahead,
+    /// Whether it made the last decision.
+    degraded_decided: bool,
     /// Why the planner itself did not make the last decision.
     fault: Option<String>,
     /// Why it could not be made.
@@ -52,7 +63,9 @@ impl GuardedPlanner {
         match (policies.make)(spec, seed) {
             Ok(planner) => Self::new(planner),
             Err(error) => {
-                Self { planner: None, fault: None, deciders: Deciders::new(), missing: Some(format!("{error:#}")) }
+                let degraded = Lookahead::default();
+                let (fault, missing, deciders) = (None, Some(format!("{error:#}")), Deciders::new());
+                Self { planner: None, degraded, degraded_decided: false, fault, missing, deciders }
             }
         }
     }
@@ -60,7 +73,9 @@ impl GuardedPlanner {
     /// Guards a planner.
     #[must_use]
     pub fn new(planner: Box<dyn Planner + Send>) -> Self {
-        Self { planner: Some(planner), fault: None, missing: None, deciders: Deciders::new() }
+        let degraded = Lookahead::default();
+        let (fault, missing, deciders) = (None, None, Deciders::new());
+        Self { planner: Some(planner), degraded, degraded_decided: false, fault, missing, deciders }
     }
 
     /// Why there is no planner but the heuristic.
@@ -75,7 +90,7 @@ impl GuardedPlanner {
         &self.deciders
     }
 
-    /// Why the heuristic made the last decision in the planner's place.
+    /// Why another one made the last decision in the planner's place.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
@@ -91,6 +106,9 @@ fn usable(planner: &mut dyn Planner, context: &DecisionContext<'_>) -> Result<De
 impl Planner for GuardedPlanner {
     /// Name of the planner that made the last decision, or will make the first.
     fn name(&self) -> String {
+        if self.degraded_decided {
+            return self.degraded.name();
+        }
         let own = self.planner.as_ref().filter(|_| self.fault.is_none());
         own.map_or_else(|| FALLBACK.name(), |planner| planner.name())
     }
@@ -98,7 +116,13 @@ impl Planner for GuardedPlanner {
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let mut fallback = FALLBACK;
         self.fault = None;
+        let minds = self.planner.as_ref().is_some_and(|planner| planner.minds_wheels());
+        self.degraded_decided = lost(&context.situation.wheels) && !minds;
         let decision = match &mut self.planner {
+            _ if self.degraded_decided => {
+                self.fault = Some(WHEEL_LOST.to_owned());
+                usable(&mut self.degraded, context)
+            }
             Some(planner) => usable(planner.as_mut(), context).or_else(|error| {
                 self.fault = Some(error.to_string());
                 usable(&mut fallback, context)
@@ -107,6 +131,19 @@ impl Planner for GuardedPlanner {
         };
         *self.deciders.entry(self.name()).or_insert(0) += 1;
         decision
+    }
+
+    fn forget(&mut self) {
+        self.planner.iter_mut().for_each(|planner| planner.forget());
+        self.degraded.forget();
+    }
+
+    fn replaced(&self) -> Option<&str> {
+        self.fault().or(self.missing())
+    }
+
+    fn minds_wheels(&self) -> bool {
+        true
     }
 
     fn rationale(&self) -> Option<Rationale> {

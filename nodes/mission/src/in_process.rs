@@ -5,13 +5,18 @@ use std::sync::Arc;
 
 use swath_sim::mission::{Mission as Loop, RequestKeeper};
 use swath_sim::model::Model;
-use swath_sim::planner::{Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{SettledTask, TaskRecord};
-use swath_sim::time::Tick;
+use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::vehicle::executive::Executive;
 use swath_sim::vehicle::flight::{Flight, Situation};
+use swath_sim::vehicle::initial::InitialState;
 use thiserror::Error;
 
+use crate::alarms::Board;
+use crate::alarms::conditions::{Report, back, of_health, of_plan, of_planner, report_all};
+use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::orders::action::Action;
 use crate::outcome::{ResourcesSummary, TaskLine};
@@ -33,6 +38,10 @@ pub enum InProcessError {
 #[derive(Clone, Debug)]
 pub struct Desk {
     requests: RequestLogic,
+    /// When it is lost and when it is back, in order; the last one may be under way.
+    away: VecDeque<(Tick, Tick)>,
+    /// What another one is made of.
+    origin: (InitialState, Tick),
     /// What is still to come, in order.
     to_come: VecDeque<Action>,
     refused: Vec<(Action, Refusal)>,
@@ -48,8 +57,38 @@ impl Desk {
     }
 }
 
+impl Desk {
+    /// Whether nobody is at the desk; who comes back to it knows what was written down.
+    fn away(&mut self, now: Tick) -> bool {
+        while let Some(&(from, until)) = self.away.front() {
+            if now < from {
+                return false;
+            }
+            if now < until {
+                return true;
+            }
+            self.away.pop_front();
+            let (initial, horizon) = &self.origin;
+            match self.requests.restarted(initial, *horizon) {
+                Ok(fresh) => self.requests = fresh,
+                // Its strips were taken under the same limits.
+                Err(refusal) => tracing::error!("the request manager cannot be made again: {refusal}"),
+            }
+        }
+        false
+    }
+}
+
 impl RequestKeeper for Desk {
     fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
+        if self.away(situation.now) {
+            // The planner goes on with what it was offered, as far as that can still be imaged.
+            let open = |it: &Candidate| {
+                it.window.close >= situation.now && self.requests.state(it.id).is_some_and(|state| !state.is_final())
+            };
+            candidates.retain(open);
+            return;
+        }
         self.requests.set_situation(*situation);
         *candidates = self.requests.on_decision_point(task, situation.now, &[]).candidates;
         for contradiction in self.requests.take_contradictions() {
@@ -70,6 +109,10 @@ impl RequestKeeper for Desk {
 pub struct InProcessMission {
     mission: Loop<Desk>,
     requested: usize,
+    faults: Troubles,
+    board: Board,
+    /// What is still to be reported of faults by order.
+    to_report: VecDeque<Report>,
 }
 
 impl InProcessMission {
@@ -86,6 +129,7 @@ impl InProcessMission {
     /// # Errors
     /// When a setting is out of range or a file of requests cannot be used.
     pub fn with_actions(mission: &Mission, actions: Vec<Action>) -> Result<Self, InProcessError> {
+        mission.faults.fits_one_process().map_err(MissionError::from)?;
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
         let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
@@ -96,13 +140,24 @@ impl InProcessMission {
             // Why one is refused is in the request manager's counts.
             _ = requests.submit(order, Tick(0));
         }
-        let mut desk = Desk { requests, to_come: actions.into(), refused: Vec::new() };
+        let faults = Troubles::new(mission, model.period);
+        let away = faults.requests.clone();
+        let origin = (mission.initial(), horizon);
+        let mut desk = Desk { requests, away, origin, to_come: actions.into(), refused: Vec::new() };
         desk.take_while(|action| action.initial);
-        let flight = Flight::new(&model, mission.spacecraft(&model)?);
+        let mut flight = Flight::new(&model, mission.spacecraft(&model)?);
+        flight.watch(&model, mission.plant.noisy());
         let delay = model.period.ticks_ceil(mission.plant.planning_delay_s);
+        let board = Board::new(model.period);
+        let to_report = of_plan(&mission.faults, model.period).into();
         let mut mission = Loop::new(model, flight, desk, horizon);
         mission.set_planning_delay(delay);
-        Ok(Self { mission, requested })
+        Ok(Self { mission, requested, faults, board, to_report })
+    }
+
+    /// The alarms.
+    pub fn board(&mut self) -> &mut Board {
+        &mut self.board
     }
 
     /// Constants of the mission.
@@ -164,9 +219,241 @@ impl InProcessMission {
         planner: &mut dyn Planner,
         until: Tick,
     ) -> Result<Option<(SettledTask, TaskLine)>, InProcessError> {
-        let Some(settled) = self.mission.fly_one(planner, until)? else { return Ok(None) };
+        if let Some((_, back)) = self.faults.guidance.pop_front_if(|(from, _)| *from <= self.mission.now()) {
+            let executive = self.fresh_executive();
+            self.mission.without_guidance(back.min(self.mission.horizon()), executive);
+        }
+        if self.mission.over() {
+            self.report(None);
+            return Ok(None);
+        }
+        let decided_at = self.mission.now();
+        let (decision, delay) = match self.faults.hold(decided_at, planner) {
+            Some(ticks) => (self.mission.decide(&mut Nobody { ticks })?, 0),
+            None => (self.mission.decide(planner)?, self.mission.planning_delay()),
+        };
+        let settled = self.fly(decision, delay, until.min(self.mission.horizon()))?;
+        self.report(Some(of_planner(decided_at, planner.replaced(), &planner.name())));
         let request = settled.record.strip.and_then(|id| self.requests().request(id));
         let line = TaskLine::new(&settled, request.map(|request| request.order.name.as_str()));
         Ok(Some((settled, line)))
+    }
+
+    /// Flies a task, in which guidance may be lost.
+    fn fly(&mut self, decision: Decision, delay: u32, until: Tick) -> Result<SettledTask, PlannerError> {
+        let task = decision.to_task(&self.mission.context())?;
+        let end = self.mission.now().after(delay).after(task.ticks()).min(until);
+        match self.faults.guidance.pop_front_if(|(from, _)| *from <= end) {
+            Some((from, back)) => {
+                let executive = self.fresh_executive();
+                let back = back.min(self.mission.horizon());
+                self.mission.fly_lost(decision, delay, (from, back), executive)
+            }
+            None => self.mission.fly_after(decision, delay, until),
+        }
+    }
+
+    fn fresh_executive(&self) -> Executive {
+        Executive::watching(self.mission.model(), self.faults.noisy)
+    }
+
+    /// Tells the board what happened up to now, and what the planner says of its decision.
+    fn report(&mut self, planner: Option<Report>) {
+        let now = self.mission.now();
+        let mut reports: Vec<Report> =
+            self.mission.take_changes().iter().flat_map(|(tick, health)| of_health(*tick, health)).collect();
+        while let Some(report) = self.to_report.pop_front_if(|report| report.tick <= now) {
+            reports.push(report);
+        }
+        reports.extend(planner);
+        report_all(&mut self.board, reports);
+        self.board.advance(now);
+    }
+}
+
+/// Decides in the place of a planner that is away: the attitude is held.
+struct Nobody {
+    ticks: u32,
+}
+
+impl Planner for Nobody {
+    fn name(&self) -> String {
+        "nobody".to_owned()
+    }
+
+    fn decide(&mut self, _: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
+        Ok(Decision::Wait { ticks: self.ticks })
+    }
+}
+
+/// What becomes of nodes on the way, as a mission orders it.
+#[derive(Clone, Debug)]
+struct Troubles {
+    /// When guidance is lost, and when another one is there.
+    guidance: VecDeque<(Tick, Tick)>,
+    /// The same of the planner.
+    planner: VecDeque<(Tick, Tick)>,
+    /// The same of the request manager.
+    requests: VecDeque<(Tick, Tick)>,
+    /// How long the attitude is held when nobody decides [ticks].
+    hold: u32,
+    noisy: bool,
+}
+
+impl Troubles {
+    fn new(mission: &Mission, period: TickPeriod) -> Self {
+        let of = |process| {
+            let all = mission.faults.of(process, period).into_iter();
+            all.map(|(it, _)| (it.from, it.until)).collect::<VecDeque<_>>()
+        };
+        let guidance = mission.faults.of(Process::Guidance, period).iter().map(|(it, _)| (it.from, back(it))).collect();
+        Self {
+            guidance,
+            planner: of(Process::Planner),
+            requests: of(Process::RequestManager),
+            hold: period.ticks_ceil(mission.hold_s).max(1),
+            noisy: mission.plant.noisy(),
+        }
+    }
+
+    /// How long the attitude is held at `now` because there is no planner [ticks]; one that comes back knows nothing of
+    /// what was before.
+    fn hold(&mut self, now: Tick, planner: &mut dyn Planner) -> Option<u32> {
+        while let Some(&(from, until)) = self.planner.front() {
+            if now < from {
+                return None;
+            }
+            if now < until {
+                return Some(self.hold.min(until.since(now) as u32));
+            }
+            self.planner.pop_front();
+            planner.forget();
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use swath_sim::planner::{Heuristic, Lookahead};
+    use swath_sim::task::TaskOutcome;
+
+    use super::*;
+    use crate::alarms::{Entry, Event};
+    use crate::guarded::GuardedPlanner;
+
+    fn mission(faults: &[&str]) -> Mission {
+        let text =
+            format!("orbits = 0.3\nseed = 3\n[requests.random]\ncount = [1500, 1500]\n[faults]\nplan = {faults:?}\n");
+        let mission: Mission = toml::from_str(&text).unwrap();
+        mission.validate().unwrap();
+        mission.resolved()
+    }
+
+    /// Tasks and the journal of alarms.
+    fn flown(faults: &[&str]) -> (Vec<SettledTask>, Vec<Entry>) {
+        let mut flight = InProcessMission::new(&mission(faults)).unwrap();
+        let mut tasks = Vec::new();
+        flight.run(&mut Lookahead::default(), |settled, _| tasks.push(settled.clone())).unwrap();
+        (tasks, flight.board().take_journal())
+    }
+
+    fn told(journal: &[Entry]) -> Vec<(&str, u64, Event)> {
+        journal.iter().map(|it| (it.key.name.as_str(), it.tick.0, it.event)).collect()
+    }
+
+    #[test]
+    fn without_faults_nothing_is_told() {
+        assert_eq!(flown(&[]).1, []);
+    }
+
+    #[test]
+    fn a_lost_guidance_interrupts_its_task_and_another_one_goes_on() {
+        let (nominal, _) = flown(&[]);
+        let (tasks, journal) = flown(&["guidance:kill@300s", "guidance:hang@600s+20s"]);
+        assert_eq!(
+            told(&journal),
+            [
+                ("guidance lost", 600, Event::Raised),
+                ("guidance lost", 603, Event::Returned),
+                ("guidance lost", 1200, Event::Raised),
+                ("guidance lost", 1242, Event::Returned),
+            ]
+        );
+        for (lost, back) in [(Tick(600), Tick(601)), (Tick(1200), Tick(1240))] {
+            let at = tasks.iter().position(|it| it.record.end == lost).unwrap();
+            assert_eq!(tasks[at].record.outcome, TaskOutcome::NOT_BEGUN);
+            assert_eq!(tasks[at + 1].record.start, back);
+            // What was under way is imaged again, or its window is over; it is not lost.
+            let numbers: Vec<u64> = tasks.iter().map(|it| it.record.task).collect();
+            assert_eq!(numbers, (0..tasks.len() as u64).collect::<Vec<_>>());
+        }
+        let before = tasks.iter().take_while(|it| it.record.end < Tick(600)).count();
+        assert_eq!(tasks[..before], nominal[..before]);
+        let reward = |tasks: &[SettledTask]| tasks.iter().map(|it| it.reward).sum::<f64>();
+        assert!(reward(&tasks) > 0.8 * reward(&nominal), "{} of {}", reward(&tasks), reward(&nominal));
+    }
+
+    #[test]
+    fn without_a_planner_the_attitude_is_held() {
+        let (tasks, journal) = flown(&["planner:hang@300s+95s"]);
+        assert_eq!(told(&journal), [("planner lost", 600, Event::Raised), ("planner lost", 792, Event::Returned),]);
+        let held: Vec<_> =
+            tasks.iter().filter(|it| it.record.start >= Tick(600) && it.record.end <= Tick(790)).collect();
+        assert!(!held.is_empty());
+        assert!(held.iter().all(|it| it.record.strip.is_none() && it.record.ticks() <= 20), "{held:?}");
+        assert!(tasks.iter().any(|it| it.record.start == Tick(790) && it.record.strip.is_some()));
+    }
+
+    /// What was acknowledged and what was imaged is written down: whoever comes back goes on as if nothing had been.
+    #[test]
+    fn a_request_manager_that_is_killed_changes_nothing() {
+        let kills: Vec<String> = (1..10).map(|number| format!("request_manager:kill@{}s", number * 150)).collect();
+        let kills: Vec<&str> = kills.iter().map(String::as_str).collect();
+        let (tasks, journal) = flown(&kills);
+        assert_eq!(tasks, flown(&[]).0);
+        assert_eq!(journal.len(), 18);
+        let (away, _) = flown(&["request_manager:hang@300s+200s"]);
+        let mut imaged: Vec<_> = away.iter().filter(|it| it.record.success()).map(|it| it.record.strip).collect();
+        imaged.sort();
+        let count = imaged.len();
+        imaged.dedup();
+        assert_eq!(imaged.len(), count, "imaged twice");
+        let meanwhile = |it: &&SettledTask| it.record.start > Tick(600) && it.record.end < Tick(1000);
+        assert!(away.iter().filter(meanwhile).any(|it| it.record.success()), "nothing was imaged meanwhile");
+    }
+
+    #[test]
+    fn what_fails_raises_its_alarm_and_returns() {
+        let plan = ["wheel2:dead@300s+200s", "gyro:bias 0.01deg/s@800s+100s", "startracker:out@1000s+30s"];
+        let (tasks, journal) = flown(&plan);
+        assert_eq!((tasks.clone(), journal.clone()), flown(&plan), "the same plan twice");
+        for (name, from, until) in
+            [("wheel y", 600, 1000), ("gyro biased", 1600, 1800), ("star tracker out", 2000, 2060)]
+        {
+            let of: Vec<_> = told(&journal).into_iter().filter(|it| it.0 == name).collect();
+            let [(_, raised, Event::Raised), (_, returned, Event::Returned)] = of[..] else { panic!("{of:?}") };
+            // A wheel shows when it is asked for torque.
+            assert!((from..from + 20).contains(&raised), "{name} raised at {raised}");
+            assert!((until..until + 10).contains(&returned), "{name} returned at {returned}");
+        }
+        assert_eq!(journal.len(), 6, "{:?}", told(&journal));
+    }
+
+    #[test]
+    fn a_planner_that_does_not_know_what_is_left_is_replaced() {
+        let mut flight = InProcessMission::new(&mission(&["wheel1:dead@300s"])).unwrap();
+        let mut planner = GuardedPlanner::new(Box::new(Heuristic { t_pre_s: 90.0 }));
+        let mut tasks = Vec::new();
+        flight.run(&mut planner, |settled, _| tasks.push(settled.clone())).unwrap();
+        let later = |it: &&SettledTask| it.record.start > Tick(900) && it.record.strip.is_some();
+        let (tried, imaged): (Vec<_>, Vec<_>) = (
+            tasks.iter().filter(later).collect(),
+            tasks.iter().filter(later).filter(|it| it.record.success()).collect(),
+        );
+        assert!(imaged.len() * 10 >= tried.len() * 8, "{} of {}", imaged.len(), tried.len());
+        assert!(!imaged.is_empty());
+        let journal = flight.board().take_journal();
+        assert!(told(&journal).iter().any(|it| it.0 == "planner replaced"), "{:?}", told(&journal));
     }
 }

@@ -2,7 +2,9 @@
 //! and whole missions in one process.
 #![expect(non_snake_case, reason = "frame letters")]
 
+pub mod alarms;
 pub mod approval;
+pub mod faults;
 pub mod file;
 pub mod guarded;
 pub mod in_process;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::model::Model;
@@ -15,6 +16,9 @@ use crate::error::MessageError;
 use crate::out;
 use crate::program::{MISSION, Program};
 use crate::stamp::Stamper;
+use swath_mission::alarms;
+use swath_mission::alarms::conditions::Report;
+use swath_mission::alarms::definitions::definition;
 use swath_mission::file::Mission;
 
 /// A started node and the mission that it flies.
@@ -118,6 +122,29 @@ impl MissionNode {
                 DiagnosticStatus::ERROR
             }
         };
+        self.diagnose(self.node.clock().stamp(), level, name, text)
+    }
+
+    /// Tells whether something that lasts is wrong: on `/diagnostics`, and as a log line.
+    ///
+    /// # Errors
+    /// When it cannot be sent.
+    pub fn condition(&self, report: &Report) -> Result<()> {
+        let Report { tick, key, wrong, text } = report;
+        let level = match (wrong, definition(&key.name).map(|it| it.severity)) {
+            (false, _) => DiagnosticStatus::OK,
+            (true, Some(alarms::Severity::Warn)) => DiagnosticStatus::WARN,
+            (true, _) => DiagnosticStatus::ERROR,
+        };
+        if *wrong {
+            tracing::warn!("{}: {text}", key.name);
+        } else {
+            tracing::debug!("{}: {text}", key.name);
+        }
+        self.diagnose(self.stamper.time(*tick), level, &key.name, text)
+    }
+
+    fn diagnose(&self, stamp: Time, level: u8, name: &str, text: &str) -> Result<()> {
         let status = DiagnosticStatus {
             level,
             name: format!("{}: {name}", self.node.names().fully_qualified()),
@@ -126,7 +153,7 @@ impl MissionNode {
             ..DiagnosticStatus::default()
         };
         let mut array = DiagnosticArray::default();
-        array.header.stamp = self.node.clock().stamp();
+        array.header.stamp = stamp;
         array.status.push(status);
         self.diagnostics.publish(&array).context("cannot raise an alarm")
     }

@@ -39,6 +39,10 @@ const COMMON: &[Parameter] = &[
     Parameter { name: "epoch", about: "Of two nodes with one name, the one of the greater epoch counts." },
     Parameter { name: "external", about: "Nodes whose place another program takes: a list of names." },
     Parameter { name: "memory_limit_mb", about: "Memory that the process may have [10^6 B]; 0 without bound." },
+    Parameter {
+        name: "packet_filter",
+        about: "Whether the kernel drops datagrams that would end or fill the process.",
+    },
     Parameter { name: "use_sim_time", about: "Always true: there is no time but the simulated." },
 ];
 

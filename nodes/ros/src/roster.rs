@@ -204,6 +204,12 @@ impl Roster {
         }
     }
 
+    /// The kernel has not handed over so many datagrams.
+    pub(crate) fn note_dropped(&self, count: u64) {
+        let text = || "they would have ended DDS or filled the memory, or came faster than they were taken".to_owned();
+        self.notices.note_several(Trouble::Dropped, &self.names.fully_qualified(), count, text);
+    }
+
     /// RustDDS was started anew.
     pub(crate) fn note_renewal(&self, reason: &str) {
         self.notices.note(Trouble::Renewed, &self.names.fully_qualified(), || reason.to_owned());

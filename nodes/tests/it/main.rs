@@ -14,3 +14,4 @@ mod peer;
 mod pins;
 mod readme;
 mod recorded;
+mod two_satellites;

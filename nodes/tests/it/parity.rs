@@ -13,7 +13,8 @@ fn tasks(mission: &Path, out: &Path, words: &[&str]) -> String {
     launch.arg("launch").arg(mission).arg("--out").arg(out).args(words);
     let flown = common::run(&mut launch);
     // 3: another planner decided than the one that was asked for.
-    let wanted = if words.iter().any(|word| word.contains("missing")) { 3 } else { 0 };
+    let replaced = std::fs::read_to_string(out.join("alarms.jsonl")).is_ok_and(|it| it.contains("planner replaced"));
+    let wanted = if replaced || words.iter().any(|word| word.contains("missing")) { 3 } else { 0 };
     assert_eq!(flown.status.code(), Some(wanted), "{launch:?}: {}", String::from_utf8_lossy(&flown.stderr));
     std::fs::read_to_string(out.join("tasks.jsonl")).unwrap()
 }
@@ -71,4 +72,42 @@ fn satellites_that_differ_from_their_model_and_planners_that_wait_are_the_same_t
             common::succeed(common::swath("0", &["refly"]).arg(bag));
         }
     }
+}
+
+/// Wheels and sensors fail in the spacecraft: tasks and what is told of alarms are the same over DDS, in one process and
+/// in a re-flight.
+#[test]
+fn wheels_and_sensors_that_fail_are_the_same_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let noise = "[plant]\nattitude_noise_rad = 2e-4\nrate_noise_rad_s = 6e-5\n";
+    let faults = "[faults]\nplan = [\"wheel2:weak 60%@300s+400s\", \"gyro:bias 0.05deg/s@500s+600s\", \
+                  \"startracker:out@900s+60s\", \"wheel1:dead@1500s\"]\n";
+    for (name, addition) in [("exact", ""), ("noisy", noise)] {
+        let mission = common::write_mission(folder.path(), &format!("{MISSION}{addition}{faults}"));
+        for planner in ["lookahead", "heuristic:90"] {
+            let out = |kind: &str| folder.path().join(format!("{name}-{planner}-{kind}"));
+            let words = ["--planner", planner, "--orbits", "0.5"];
+            let in_process = tasks(&mission, &out("in-process"), &[&words[..], &["--in-process"]].concat());
+            let over_dds = tasks(&mission, &out("dds"), &words);
+            assert_eq!(over_dds, in_process, "{name}, planner {planner}");
+            let alarms = |kind: &str| std::fs::read_to_string(out(kind).join("alarms.jsonl")).unwrap();
+            assert_eq!(alarms("dds"), alarms("in-process"), "{name}, planner {planner}");
+            for alarm in ["wheel y", "gyro biased", "star tracker out", "wheel x"] {
+                assert!(alarms("dds").contains(alarm), "{alarm}: {}", alarms("dds"));
+            }
+            assert_eq!(alarms("dds").contains("planner replaced"), planner == "heuristic:90");
+            let bag = out("dds").join("bag");
+            common::succeed(common::swath("0", &["refly"]).arg(bag));
+        }
+    }
+}
+
+#[test]
+fn faults_that_cannot_be_flown_over_dds_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let mission = common::write_mission(folder.path(), "orbits = 0.5\n[faults]\nplan = [\"guidance:kill@120s\"]\n");
+    let mut launch = common::command("swath", &common::domain());
+    let output = launch.arg("launch").arg(&mission).arg("--out").arg(folder.path().join("out")).output().unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && text.contains("guidance:kill@120s cannot be flown over DDS"), "{text}");
 }

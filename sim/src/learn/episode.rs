@@ -17,7 +17,9 @@ use crate::rng;
 use crate::task::{SettledTask, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::errors::PlantErrors;
+use crate::vehicle::faults::TimedFault;
 use crate::vehicle::flight::{Flight, Situation};
+use crate::vehicle::health::Health;
 use crate::vehicle::initial::InitialState;
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::strip::{StripId, StripRequest};
@@ -152,6 +154,21 @@ impl Mission<EpisodeRequests> {
         self.refit(|flight, model| flight.spacecraft.differ(model, errors, seed))?;
         self.set_planning_delay(self.model().period.ticks_ceil(errors.planning_delay_s));
         Ok(())
+    }
+
+    /// From now on faults befall the satellite at their ticks, and its executive watches wheels and sensors; `noisy` is
+    /// whether the sensors are known to be. What else differs must be said before.
+    pub fn suffer(&mut self, faults: &[TimedFault], noisy: bool) {
+        self.refit(|flight, model| {
+            flight.watch(model, noisy);
+            flight.spacecraft.suffer(faults.iter().copied());
+        });
+    }
+
+    /// What is known of wheels and sensors.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.flight().health()
     }
 
     /// Adds requests at the present decision. Each one's identity or refusal, in order.

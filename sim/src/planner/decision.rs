@@ -6,6 +6,7 @@ use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::task::{Duty, Task, TaskRecord};
 use crate::vehicle::flight::Situation;
+use crate::vehicle::health::lost;
 
 /// Everything that a decision rests on.
 #[derive(Clone, Copy, Debug)]
@@ -128,6 +129,19 @@ pub trait Planner {
     /// When no usable decision could be made.
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError>;
 
+    /// Forgets what it has learned from the tasks before, as one that is made anew.
+    fn forget(&mut self) {}
+
+    /// Why another planner made the last decision in its place.
+    fn replaced(&self) -> Option<&str> {
+        None
+    }
+
+    /// Whether it plans with the wheels that the situation says are left.
+    fn minds_wheels(&self) -> bool {
+        false
+    }
+
     /// Why it decided as it last did; nothing from a planner that does not weigh candidates.
     fn rationale(&self) -> Option<Rationale> {
         None
@@ -144,9 +158,14 @@ pub(super) fn wait(context: &DecisionContext<'_>, ticks_to_wait: impl Iterator<I
     Decision::Wait { ticks }
 }
 
+/// Shortest wait when nothing can be imaged with a wheel lost [s].
+const REST_S: f64 = 10.0;
+
 /// Nothing can be imaged now: waits until a window comes within reach.
 #[must_use]
 pub fn wait_for_a_window(context: &DecisionContext<'_>) -> Decision {
     let latest = context.situation.now.after(context.model.t_pre_max());
-    wait(context, context.candidates.iter().map(|c| c.window.open.since(latest).max(1)))
+    // With a wheel lost, strips in reach may be out of what can be pointed: the satellite comes to rest meanwhile.
+    let least = if lost(&context.situation.wheels) { context.model.period.ticks_ceil(REST_S).max(1) } else { 1 };
+    wait(context, context.candidates.iter().map(|c| c.window.open.since(latest).max(i64::from(least))))
 }

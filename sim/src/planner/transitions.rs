@@ -58,6 +58,7 @@ impl<'a> Transitions<'a> {
             body: BodyState { sigma_BN, omega_BN_B, wheel_speed: wheels / plant.wheel_inertia },
             servo_integral: Vector3::zeros(),
             torque_pending: Vector3::zeros(),
+            wheels: self.search.begin.wheels,
             resources: self.search.begin.resources,
         }
     }

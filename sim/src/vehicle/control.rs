@@ -73,6 +73,19 @@ impl ControlLaw {
         Steering { omega_star, omega_star_prime }
     }
 
+    /// Largest steering rate ω_max [rad/s].
+    #[must_use]
+    pub fn omega_max(&self) -> f64 {
+        self.omega_max
+    }
+
+    /// Motor torque command that only damps the body's rates [N m]: u = P·ω, which takes energy from the body, ω·u ≥ 0,
+    /// whichever of the wheels follow it.
+    #[must_use]
+    pub fn damping(&self, omega_BN_B: &Vector3<f64>) -> Vector3<f64> {
+        omega_BN_B * self.p
+    }
+
     /// Motor torque command [N m], not yet saturated (Basilisk rateServoFullNonlinear):
     /// u = P·δω + Ki·z - (ω*+ω_RN)×(I·ω + Js·(ω+Ω)) - I·(-ω×ω_RN + ω*′), with δω = ω_BR - ω*.
     ///

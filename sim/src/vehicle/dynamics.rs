@@ -45,8 +45,11 @@ pub struct Plant {
     pub inertia: Vector3<f64>,
     /// Spin inertia of each wheel [kg m²].
     pub wheel_inertia: f64,
-    torque_max: f64,
+    /// Torque limit of each wheel [N m].
+    torque_max: Vector3<f64>,
     wheel_speed_max: f64,
+    /// 1 for a wheel that turns freely, 0 for one whose speed cannot change.
+    free: Vector3<f64>,
     /// I - Js [kg m²] and its inverse.
     net_inertia: Vector3<f64>,
     net_inertia_inverse: Vector3<f64>,
@@ -62,7 +65,8 @@ impl Plant {
         Self {
             inertia,
             wheel_inertia: config.wheel_inertia_kg_m2,
-            torque_max: config.wheel_torque_max_nm,
+            torque_max: Vector3::repeat(config.wheel_torque_max_nm),
+            free: Vector3::repeat(1.0),
             wheel_speed_max: config.wheel_speed_max_rpm * RAD_S_PER_RPM,
             net_inertia,
             net_inertia_inverse: net_inertia.map(f64::recip),
@@ -76,13 +80,37 @@ impl Plant {
         Self { torque_max: self.torque_max * (1.0 - share), ..self.clone() }
     }
 
+    /// The same with wheels of which each gives only a share of its torque limit.
+    #[must_use]
+    pub fn limited(&self, shares: &Vector3<f64>) -> Self {
+        Self { torque_max: self.torque_max.component_mul(shares), ..self.clone() }
+    }
+
+    /// The same with a wheel, 0 to 2, whose speed relative to the body stays what it is. Its axis then has the whole
+    /// inertia I, and the momentum Js·Ω of the wheel is constant.
+    #[must_use]
+    pub fn seized(&self, wheel: usize) -> Self {
+        let mut plant = self.clone();
+        plant.torque_max[wheel] = 0.0;
+        plant.free[wheel] = 0.0;
+        plant.net_inertia[wheel] = plant.inertia[wheel];
+        plant.net_inertia_inverse[wheel] = plant.inertia[wheel].recip();
+        plant
+    }
+
+    /// Torque limit of each wheel [N m].
+    #[must_use]
+    pub fn torque_max(&self) -> &Vector3<f64> {
+        &self.torque_max
+    }
+
     /// What the wheels make of a torque command [N m]: clamped to their limit, and nothing that would speed up a wheel
     /// beyond its speed limit.
     #[inline]
     #[must_use]
     pub fn saturate(&self, command: &Vector3<f64>, wheel_speed: &Vector3<f64>) -> Vector3<f64> {
-        command.zip_map(wheel_speed, |torque, speed| {
-            let torque = torque.clamp(-self.torque_max, self.torque_max);
+        command.zip_zip_map(wheel_speed, &self.torque_max, |torque, speed, max| {
+            let torque = torque.clamp(-max, max);
             if speed.abs() >= self.wheel_speed_max && torque * speed > 0.0 { 0.0 } else { torque }
         })
     }
@@ -119,7 +147,7 @@ impl Plant {
         let dt = self.dt;
         let half = 0.5 * dt;
         let (sigma0, omega0) = (state.sigma_BN, state.omega_BN_B);
-        let spin0 = (state.wheel_speed + omega0) * self.wheel_inertia;
+        let spin0 = (state.wheel_speed + omega0.component_mul(&self.free)) * self.wheel_inertia;
         let spin_half = spin0 + torque * half;
         let spin_end = spin0 + torque * dt;
 
@@ -137,10 +165,11 @@ impl Plant {
         let omega = omega0 + (dw1 + (dw2 + dw3) * 2.0 + dw4) * sixth;
         state.sigma_BN = if sigma.norm_squared() > 1.0 { mrp::shadow(&sigma) } else { sigma };
         state.omega_BN_B = omega;
-        state.wheel_speed = spin_end * (1.0 / self.wheel_inertia) - omega;
+        state.wheel_speed = spin_end * (1.0 / self.wheel_inertia) - omega.component_mul(&self.free);
     }
 
-    /// σ̇ and ω̇; `spin` is the wheels' absolute momentum Js·(Ω+ω) [N m s], `torque` the wheels' less that from outside.
+    /// σ̇ and ω̇; `spin` is the wheels' absolute momentum Js·(Ω+ω) [N m s], Js·Ω of one that is seized; `torque` the wheels'
+    /// less that from outside.
     #[inline(always)]
     fn derivative(
         &self,
@@ -166,7 +195,8 @@ impl Plant {
     pub fn energy(&self, state: &BodyState) -> f64 {
         let w = &state.omega_BN_B;
         let wheels = (w + state.wheel_speed).norm_squared() * self.wheel_inertia;
-        0.5 * (w.dot(&self.net_inertia.component_mul(w)) + wheels)
+        let body = self.inertia.add_scalar(-self.wheel_inertia);
+        0.5 * (w.dot(&body.component_mul(w)) + wheels)
     }
 }
 
@@ -239,6 +269,23 @@ mod tests {
         assert_relative_eq!(state.omega_BN_B.x, -0.3 * 10.0 / net, max_relative = 1e-12);
         // θ = ½·α·t², σ = tan(θ/4).
         assert_relative_eq!(state.sigma_BN.x, libm::tan(-0.5 * 0.3 / net * 100.0 / 4.0), max_relative = 1e-7);
+    }
+
+    /// A seized wheel is a part of the body that carries momentum: total momentum stays, and so does its speed, while
+    /// the others turn the body.
+    #[test]
+    fn a_seized_wheel_keeps_its_speed_and_the_momentum_is_conserved() {
+        let plant = Plant::new(&SimConfig::default().spacecraft, 0.5).seized(1);
+        let mut state = tumbling();
+        let (before, speed) = (plant.momentum_N(&state), state.wheel_speed.y);
+        for k in 0..200 {
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let torque = plant.saturate(&(Vector3::new(0.3, 0.3, -0.2) * sign), &state.wheel_speed);
+            assert_eq!(torque.y, 0.0);
+            plant.step(&mut state, &torque);
+            assert_relative_eq!(state.wheel_speed.y, speed, max_relative = 1e-12);
+        }
+        assert_relative_eq!(plant.momentum_N(&state), before, max_relative = 1e-6);
     }
 
     #[test]

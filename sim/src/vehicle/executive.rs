@@ -7,6 +7,7 @@ use crate::task::{Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::guidance::{Guidance, GuidanceTick};
+use crate::vehicle::health::{Health, Watch};
 
 /// The satellite at a tick, as the executive is told of it.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +29,8 @@ pub struct Executive {
     pub guidance: Guidance,
     judge: Option<Box<Guidance>>,
     active: Option<Active>,
+    /// There is none in a planner's head, where everything is as the model says.
+    watch: Option<Box<Watch>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +46,30 @@ impl Executive {
     /// An executive without a task.
     #[must_use]
     pub fn new(model: &Model) -> Self {
-        Self { guidance: Guidance::new(model), judge: None, active: None }
+        Self { guidance: Guidance::new(model), judge: None, active: None, watch: None }
+    }
+
+    /// The same, watching wheels and sensors; `noisy` is whether the sensors are known to be.
+    #[must_use]
+    pub fn watching(model: &Model, noisy: bool) -> Self {
+        Self { watch: Some(Box::new(Watch::new(model, noisy))), ..Self::new(model) }
+    }
+
+    /// What is known of wheels and sensors.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.watch.as_ref().map(|watch| *watch.health()).unwrap_or_default()
+    }
+
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.watch.as_mut().map(|watch| watch.take_changes()).unwrap_or_default()
+    }
+
+    /// Attitude, rate and wheel speeds as they are best known.
+    #[inline]
+    pub fn look(&mut self, sight: &Sight<'_>) -> BodyState {
+        self.watch.as_mut().map_or(*sight.measured, |watch| watch.look(sight.now, sight.measured))
     }
 
     /// Takes up task `number` after `delay` ticks in which the attitude is held.
@@ -54,7 +80,8 @@ impl Executive {
     }
 
     fn start(&mut self, task: Task, sight: &Sight<'_>) {
-        self.guidance.start(task, sight.now, sight.measured);
+        let seen = self.look(sight);
+        self.guidance.start(task, sight.now, &seen);
         let Some(truth) = sight.truth else { return };
         let guidance = &self.guidance;
         self.judge.get_or_insert_with(|| Box::new(guidance.clone())).start(task, sight.now, truth);
@@ -82,7 +109,8 @@ impl Executive {
     pub fn finish(&mut self, sight: &Sight<'_>) -> Option<TaskRecord> {
         let Active { number, task, start, begun } = self.active.take()?;
         let (now, r_BN_N) = (sight.now, &sight.r_BN_N);
-        let seen = self.guidance.finish(now, r_BN_N, sight.measured);
+        let body = self.look(sight);
+        let seen = self.guidance.finish(now, r_BN_N, &body);
         let judged = match (&mut self.judge, sight.truth) {
             (Some(judge), Some(truth)) => judge.finish(now, r_BN_N, truth),
             _ => None,
@@ -105,6 +133,13 @@ impl Executive {
         if let (Some(judge), Some(truth)) = (&mut self.judge, sight.truth) {
             judge.tick(sight.now, &sight.r_BN_N, truth);
         }
-        self.guidance.tick(sight.now, &sight.r_BN_N, sight.measured)
+        let Some(watch) = &mut self.watch else {
+            return self.guidance.tick(sight.now, &sight.r_BN_N, sight.measured);
+        };
+        let body = watch.look(sight.now, sight.measured);
+        self.guidance.wheel_lost = watch.health().wheel_lost();
+        let tick = self.guidance.tick(sight.now, &sight.r_BN_N, &body);
+        watch.commanded(sight.now, tick.torque);
+        tick
     }
 }

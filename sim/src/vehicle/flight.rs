@@ -8,6 +8,8 @@ use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::executive::{Executive, Sight};
 use crate::vehicle::guidance::GuidanceTick;
+use crate::vehicle::health;
+use crate::vehicle::health::Health;
 use crate::vehicle::resources::{Activity, Imager, ResourceState};
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;
@@ -21,12 +23,14 @@ pub struct Situation {
     pub r_BN_N: Vector3<f64>,
     /// Velocity in N [m/s].
     pub v_BN_N: Vector3<f64>,
-    /// Attitude, rate and wheel speeds as they are measured.
+    /// Attitude, rate and wheel speeds as they are best known.
     pub body: BodyState,
     /// The servo's rate-error integral [rad].
     pub servo_integral: Vector3<f64>,
     /// Torque commanded one tick ago, which acts until the next tick [N m].
     pub torque_pending: Vector3<f64>,
+    /// Share of its torque limit that each wheel is known to give; 1 for a sound one.
+    pub wheels: Vector3<f64>,
     /// How power and data stand, where they have bounds.
     pub resources: Option<ResourceState>,
 }
@@ -50,11 +54,18 @@ impl Flight {
         Self { spacecraft, executive: Executive::new(model), torque_pending: Vector3::zeros(), warm_up }
     }
 
+    /// Gives it an executive that watches wheels and sensors; `noisy` is whether the sensors are known to be.
+    pub fn watch(&mut self, model: &Model, noisy: bool) {
+        self.executive = Executive::watching(model, noisy);
+    }
+
     /// A flight in a planner's head: from what is known of the satellite, by what the model says of it.
     #[must_use]
     pub fn predicted(model: &Model, situation: &Situation) -> Self {
         let orbit = Orbit::through(&situation.r_BN_N, &situation.v_BN_N, situation.now, model.period);
         let mut flight = Self::new(model, Spacecraft::on_orbit(model, orbit, situation.body, situation.now));
+        flight.spacecraft.refit(model.plant.limited(&situation.wheels));
+        flight.executive.guidance.wheel_lost = health::lost(&situation.wheels);
         flight.rewind(situation);
         flight
     }
@@ -76,15 +87,23 @@ impl Flight {
     /// What a planner may know now.
     pub fn situation(&mut self) -> Situation {
         let now = self.now();
+        let body = self.executive.look(&sight(&mut self.spacecraft));
         Situation {
             now,
             r_BN_N: self.spacecraft.orbit.position(now),
             v_BN_N: self.spacecraft.orbit.velocity(now),
-            body: *self.spacecraft.measured(),
+            body,
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
+            wheels: self.executive.health().wheels,
             resources: self.spacecraft.onboard().map(|onboard| *onboard.state()),
         }
+    }
+
+    /// What is known of wheels and sensors.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.executive.health()
     }
 
     /// Takes up a task now.
@@ -112,18 +131,61 @@ impl Flight {
         self.executive.finish(&sight_then).unwrap_or_else(none)
     }
 
+    /// Flies task `number` until guidance is lost with all that it knew, before it sees the state at `lost`; a fresh one,
+    /// `executive`, is there at `back`, a tick later at least. Meanwhile the wheels hold no torque. The task counts as
+    /// interrupted, and nothing is known of its images.
+    pub fn fly_lost(
+        &mut self,
+        number: u64,
+        task: Task,
+        delay: u32,
+        lost: Tick,
+        back: Tick,
+        executive: Executive,
+    ) -> TaskRecord {
+        let start = self.now().after(delay);
+        self.executive.begin(number, task, delay, &sight(&mut self.spacecraft));
+        while self.now() < lost {
+            self.tick();
+        }
+        self.without_guidance(back, executive);
+        TaskRecord::new(number, &task, start.min(lost), lost, TaskOutcome::NOT_BEGUN)
+    }
+
+    /// Flies without guidance until `back`, a tick at least; `executive` takes over then.
+    pub fn without_guidance(&mut self, back: Tick, executive: Executive) {
+        self.executive = executive;
+        loop {
+            self.advance();
+            self.torque_pending = Vector3::zeros();
+            if self.now() >= back {
+                return;
+            }
+        }
+    }
+
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.executive.take_changes()
+    }
+
     /// One closed-loop tick: the command computed from this tick's state waits while the previous one acts.
     #[inline]
     pub fn tick(&mut self) -> GuidanceTick {
         let tick = self.executive.tick(&sight(&mut self.spacecraft));
+        self.advance();
+        self.torque_pending = tick.torque;
+        tick
+    }
+
+    #[inline]
+    fn advance(&mut self) {
         if self.spacecraft.onboard().is_some() {
             let activity = self.activity();
             self.spacecraft.advance_doing(&self.torque_pending, activity);
         } else {
             self.spacecraft.advance(&self.torque_pending);
         }
-        self.torque_pending = tick.torque;
-        tick
     }
 
     /// What imager, transmitter and thrusters do over the tick that begins now.

@@ -46,8 +46,15 @@ pub struct Guidance {
     axes: Option<Axes>,
     /// Rate-error integral z of the servo [rad]; persists from task to task.
     pub servo_integral: Vector3<f64>,
+    /// Whether a wheel is lost, so that an attitude cannot be held in general: waits damp the rates instead, and so does
+    /// everything else once they are beyond a share of the steering rate's limit. A body that is only damped loses
+    /// energy whatever wheels are left, while a servo that asks a lost wheel for torque can drive it into a tumble.
+    pub wheel_lost: bool,
     active: Option<ActiveTask>,
 }
+
+/// Share of the steering rate's limit beyond which rates are damped when a wheel is lost.
+const DAMPED_FROM: f64 = 0.5;
 
 /// Body axes that duties point, and the Sun.
 #[derive(Clone, Copy, Debug)]
@@ -147,6 +154,7 @@ impl Guidance {
             dt: model.period.seconds(),
             axes: Axes::new(model),
             servo_integral: Vector3::zeros(),
+            wheel_lost: false,
             active: None,
         }
     }
@@ -225,8 +233,13 @@ impl Guidance {
             omega_BR_B += axis_B * (body.omega_BN_B - omega_BR_B).dot(&axis_B);
         }
         active.previous_sigma = Some(sigma_BR);
+        let waits = matches!(active.task, Task::Wait { .. });
         self.active = Some(active);
         let error = TrackingError { sigma_BR, omega_BR_B };
+        if self.wheel_lost && (waits || body.omega_BN_B.norm() > DAMPED_FROM * self.law.omega_max()) {
+            let torque = self.plant.saturate(&self.law.damping(&body.omega_BN_B), &body.wheel_speed);
+            return GuidanceTick { torque, error, sin_elevation, imaging };
+        }
         let integral = &mut self.servo_integral;
         let command = self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
         GuidanceTick { torque: self.plant.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }

@@ -8,6 +8,7 @@ use crate::rng;
 use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
 use crate::vehicle::errors::{PlantErrors, Sensor};
+use crate::vehicle::faults::{Faults, TimedFault};
 use crate::vehicle::initial::InitialState;
 use crate::vehicle::resources::{Activity, Onboard};
 use crate::world::orbit::Orbit;
@@ -42,15 +43,31 @@ pub struct Spacecraft {
     pub torque_applied: Vector3<f64>,
     plant: Plant,
     measured: Option<Box<Measured>>,
+    faults: Option<Box<Faults>>,
     onboard: Option<Box<Onboard>>,
 }
 
 /// What sensors that are not exact tell.
 #[derive(Clone, Debug)]
 struct Measured {
-    sensor: Sensor,
+    sensor: Option<Sensor>,
+    /// What the gyro adds to each axis [rad/s].
+    gyro_bias: f64,
+    /// Whether the star tracker repeats its last attitude.
+    tracker_out: bool,
     /// The state as it is measured at the present tick.
     body: BodyState,
+}
+
+impl Measured {
+    fn measure(&mut self, truth: &BodyState) {
+        let mut body = self.sensor.as_mut().map_or(*truth, |sensor| sensor.measure(truth));
+        body.omega_BN_B.add_scalar_mut(self.gyro_bias);
+        if self.tracker_out {
+            body.sigma_BN = self.body.sigma_BN;
+        }
+        self.body = body;
+    }
 }
 
 impl Spacecraft {
@@ -66,7 +83,7 @@ impl Spacecraft {
     #[must_use]
     pub fn on_orbit(model: &Model, orbit: Orbit, body: BodyState, now: Tick) -> Self {
         let (torque_applied, plant) = (Vector3::zeros(), model.plant.clone());
-        Self { orbit, body, now, torque_applied, plant, measured: None, onboard: None }
+        Self { orbit, body, now, torque_applied, plant, measured: None, faults: None, onboard: None }
     }
 
     /// Its power, data and momentum, where they are not boundless.
@@ -87,10 +104,35 @@ impl Spacecraft {
     pub fn differ(&mut self, model: &Model, errors: &PlantErrors, seed: u64) -> Result<(), SimError> {
         self.plant = errors.plant(model)?;
         let body = self.body;
-        self.measured = errors
-            .sensor(rng::stream(seed, rng::SENSORS))
-            .map(|mut sensor| Box::new(Measured { body: sensor.measure(&body), sensor }));
+        self.measured = errors.sensor(rng::stream(seed, rng::SENSORS)).map(|mut sensor| {
+            let seen = sensor.measure(&body);
+            Box::new(Measured { sensor: Some(sensor), gyro_bias: 0.0, tracker_out: false, body: seen })
+        });
         Ok(())
+    }
+
+    /// From now on faults befall it at their ticks; those that it suffers already stay.
+    pub fn suffer(&mut self, faults: impl IntoIterator<Item = TimedFault>) {
+        let all = self.faults.get_or_insert_with(|| Box::new(Faults::new(self.plant.clone())));
+        all.add(faults);
+        if self.measured.is_none() && all.touch_sensors() {
+            let body = self.body;
+            self.measured = Some(Box::new(Measured { sensor: None, gyro_bias: 0.0, tracker_out: false, body }));
+        }
+        self.mind_faults();
+    }
+
+    /// Brings body and sensors into the state that the faults of this tick leave them in.
+    #[cold]
+    fn mind_faults(&mut self) {
+        let Some(faults) = &mut self.faults else { return };
+        let effects = faults.at(self.now);
+        self.plant = effects.plant;
+        if let Some(measured) = &mut self.measured {
+            measured.body.omega_BN_B.add_scalar_mut(effects.gyro_bias - measured.gyro_bias);
+            measured.gyro_bias = effects.gyro_bias;
+            measured.tracker_out = effects.tracker_out;
+        }
     }
 
     /// From now on it has another body and wheels.
@@ -140,8 +182,11 @@ impl Spacecraft {
             self.plant.step(&mut self.body, &self.torque_applied);
         }
         self.now = self.now.after(1);
+        if self.faults.as_ref().is_some_and(|faults| faults.due(self.now)) {
+            self.mind_faults();
+        }
         if let Some(measured) = &mut self.measured {
-            measured.body = measured.sensor.measure(&self.body);
+            measured.measure(&self.body);
         }
     }
 

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+mod regress_faults;
 mod regress_ground;
 mod regress_learners;
 mod regress_missions;

@@ -111,8 +111,13 @@ const NOT_AS_ASKED: u8 = 3;
 /// then is in the outputs; where nothing was, there are none.
 pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
-    if mission.sim.resources.is_some() && !args.in_process {
-        bail!("a mission with [resources] flies in one process only: add --in-process");
+    if args.in_process {
+        mission.faults.fits_one_process()?;
+    } else {
+        mission.faults.fits_dds()?;
+        if mission.sim.resources.is_some() {
+            bail!("a mission with [resources] flies in one process only: add --in-process");
+        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
@@ -191,6 +196,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     progress.finish();
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
+    output.write_alarms(&flight.board().take_journal())?;
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, bail};
 
+use swath_mission::alarms::Entry;
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::import;
 use swath_mission::orders::order::Order;
@@ -83,6 +84,20 @@ impl OutputFolder {
         serde_json::to_writer(&mut self.tasks, line)?;
         self.tasks.write_all(b"\n")?;
         Ok(self.tasks.flush()?)
+    }
+
+    /// Writes what happened to alarms as `alarms.jsonl`, if anything did.
+    pub fn write_alarms(&self, journal: &[Entry]) -> Result<()> {
+        if journal.is_empty() {
+            return Ok(());
+        }
+        let mut text = String::new();
+        for entry in journal {
+            text += &serde_json::to_string(entry)?;
+            text.push('\n');
+        }
+        let path = self.path.join("alarms.jsonl");
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// Writes `summary.json`.

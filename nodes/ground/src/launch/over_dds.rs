@@ -5,10 +5,11 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use swath_msgs::diagnostic_msgs::DiagnosticArray;
+use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::task_record;
 use swath_node::out;
+use swath_node::stamp::Stamper;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
@@ -16,6 +17,8 @@ use swath_sim::time::Tick;
 use super::fleet::Fleet;
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
+use swath_mission::alarms::conditions::{Report, report_all};
+use swath_mission::alarms::{Board, Entry, Key};
 use swath_mission::file::Mission;
 use swath_mission::guarded::{Deciders, Policies, made_instead};
 use swath_mission::outcome::{Summary, SummaryInputs};
@@ -70,6 +73,7 @@ pub fn fly(
     let Some(flown) = launcher.flown else {
         return Err(watched.err().unwrap_or_else(|| anyhow!("the mission has not begun")));
     };
+    output.write_alarms(&launcher.journal(flown.end))?;
     // The recorder ends first: the nodes' last messages reach it while they are still there.
     let recorded = fleet.stop(&[graph::RECORDER]).and_then(|()| match record {
         true => count_messages(&output.path().join("bag")),
@@ -169,6 +173,14 @@ fn count_messages(bag: &Path) -> Result<u64> {
     Ok(information.message_count)
 }
 
+/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`.
+fn report(tick: Tick, status: DiagnosticStatus) -> Option<Report> {
+    let (node, name) = status.name.split_once(": ")?;
+    let (_, node) = node.rsplit_once('/')?;
+    let key = graph::MEMBERS.contains(&node).then(|| Key::new(node, name))?;
+    Some(Report { tick, key, wrong: status.level != DiagnosticStatus::OK, text: status.message })
+}
+
 struct Launcher {
     node: Node,
     shutdown: Shutdown,
@@ -188,6 +200,10 @@ struct Launcher {
     log: TaskLog,
     last_summary: Option<msg::RequestSummary>,
     paced: bool,
+    stamper: Stamper,
+    /// What nodes said of alarms. The journal is made of it at the end, because what two nodes say of one tick comes in
+    /// any order.
+    reports: Vec<Report>,
 }
 
 /// How far the mission has come.
@@ -214,10 +230,12 @@ impl Launcher {
             deciders: Deciders::new(),
             flown: None,
             horizon: mission.horizon(&model),
-            model,
             log: TaskLog::default(),
             last_summary: None,
             paced: mission.pace > 0.0,
+            stamper: Stamper::new(mission.epoch_unix_s, model.period),
+            reports: Vec::new(),
+            model,
             node,
         })
     }
@@ -295,11 +313,21 @@ impl Launcher {
             self.last_summary = Some(summary);
         }
         while let Some(array) = self.diagnostics.take()? {
+            let tick = self.stamper.tick_from(&array.header.stamp);
             for status in array.status {
                 tracing::debug!("{}: {}", status.name, status.message);
+                self.reports.extend(report(tick, status));
             }
         }
         Ok(())
+    }
+
+    /// What happened to the alarms of a mission that has ended.
+    fn journal(&mut self, end: Tick) -> Vec<Entry> {
+        let mut board = Board::new(self.model.period);
+        report_all(&mut board, std::mem::take(&mut self.reports));
+        board.advance(end);
+        board.take_journal()
     }
 
     /// Waits for the last rewards and the last summary of the request manager.

@@ -10,6 +10,7 @@ pub mod reason;
 pub mod refusal;
 pub mod register;
 pub mod request;
+pub mod restart;
 mod settle;
 mod sharing;
 

@@ -67,6 +67,9 @@ def main():
     # What has been seen is told when nothing more comes.
     while tick is None or tick < last or time.monotonic() - quiet < 0.5:
         for sample in reader.take(1 if rate else 1000):
+            # The writer has gone.
+            if not sample.sample_info.valid_data:
+                continue
             if received == 0:
                 print("reading")
             received, quiet, tick = received + 1, time.monotonic(), sample.tick

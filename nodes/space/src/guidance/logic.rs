@@ -9,6 +9,7 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::guidance::GuidanceTick;
+use swath_sim::vehicle::health::Health;
 use swath_sim::vehicle::spacecraft::StateSample;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
@@ -167,6 +168,18 @@ impl GuidanceLogic {
         self
     }
 
+    /// From now on it watches wheels and sensors; `noisy` is whether the sensors are known to be.
+    #[must_use]
+    pub fn watching(mut self, noisy: bool) -> Self {
+        self.executive = Executive::watching(&self.model, noisy);
+        self
+    }
+
+    /// What came to be known of wheels and sensors since the last call, each with its tick.
+    pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
+        self.executive.take_changes()
+    }
+
     /// Takes a state. A state seen before brings its command again, so that a lost sample stops nothing.
     pub fn on_state(&mut self, state: StateSample) -> Vec<Effect> {
         if let Some(latest) = &self.latest
@@ -245,13 +258,15 @@ impl GuidanceLogic {
         if self.executive.task().is_some() {
             return vec![self.fly(&state)];
         }
+        let body = self.executive.look(&sight(&state));
         let situation = Situation {
             now: state.tick,
             r_BN_N: state.r_BN_N,
             v_BN_N: state.v_BN_N,
-            body: state.body,
+            body,
             servo_integral: self.executive.guidance.servo_integral,
             torque_pending: self.torque_pending,
+            wheels: self.executive.health().wheels,
             resources: None,
         };
         if !over {
@@ -259,7 +274,7 @@ impl GuidanceLogic {
         }
         vec![Effect::Decide(Box::new(DecisionPoint {
             task: self.task,
-            state,
+            state: StateSample { body, ..state },
             situation,
             mission_over: over,
             finished,

@@ -72,6 +72,7 @@ pub fn decision_point(stamper: &Stamper, point: &DecisionPoint) -> msg::Decision
         state,
         servo_integral: point.situation.servo_integral.into(),
         torque_pending: point.situation.torque_pending.into(),
+        wheel_share: point.situation.wheels.into(),
         mission_over: point.mission_over,
         result: point.finished.as_ref().map(task_result).into_iter().collect::<Vec<_>>(),
         last_imaging: point.last_imaging.as_ref().map(task_result).into_iter().collect::<Vec<_>>(),

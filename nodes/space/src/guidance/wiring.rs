@@ -14,6 +14,7 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 use super::logic::{Command, Effect, GuidanceLogic};
 use super::messages;
+use swath_mission::alarms::conditions::of_health;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::node::{MissionNode, Severity};
 use swath_node::program::{PACE, Program};
@@ -63,6 +64,8 @@ struct GuidanceNode {
     status_every: u64,
     deadline: Duration,
     question: Option<Question>,
+    /// Whether something was wrong with wheels or sensors before.
+    health_told: bool,
     base: MissionNode,
 }
 
@@ -88,9 +91,11 @@ impl GuidanceNode {
         let hold = period.ticks_ceil(mission.hold_s);
         let delay = period.ticks_ceil(mission.plant.planning_delay_s);
         Ok(Self {
-            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold).with_planning_delay(delay),
+            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold)
+                .with_planning_delay(delay)
+                .watching(mission.plant.noisy()),
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
-            truths: match mission.plant.noisy() {
+            truths: match mission.tells_truth_apart(period) {
                 true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
                 false => None,
             },
@@ -105,6 +110,7 @@ impl GuidanceNode {
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             deadline: Duration::from_secs_f64(seconds),
             question: None,
+            health_told: false,
             base,
         })
     }
@@ -147,7 +153,20 @@ impl GuidanceNode {
                 self.unpaired.1.retain(|&tick, _| tick > state.tick);
             }
             let effects = self.logic.on_state(state);
+            self.tell_health()?;
             self.carry_out(effects)?;
+        }
+        Ok(())
+    }
+
+    /// Tells what came to be known of wheels and sensors; nothing as long as nothing was ever wrong.
+    fn tell_health(&mut self) -> Result<()> {
+        for (tick, health) in self.logic.take_changes() {
+            let reports = of_health(tick, &health);
+            self.health_told |= reports.iter().any(|report| report.wrong);
+            if self.health_told {
+                reports.iter().try_for_each(|report| self.base.condition(report))?;
+            }
         }
         Ok(())
     }

@@ -110,7 +110,7 @@ impl PlannerLogic {
             decision,
             kind,
             planner: self.planner.name(),
-            fault: self.planner.planner.fault().map(str::to_owned),
+            fault: self.planner.replaced().map(str::to_owned),
             rationale: self.planner.rationale(),
         })
     }

@@ -8,11 +8,12 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::messages::{situation, task_record};
 use swath_node::orders::{operator_action, planner_mode};
 use swath_ros::{Publisher, Server, Spec, Subscription, graph};
-use swath_sim::planner::{Planner, PlannerSpec};
+use swath_sim::planner::PlannerSpec;
 use swath_sim::time::Tick;
 
 use super::logic::{Planned, PlannerLogic};
 use super::messages;
+use swath_mission::alarms::conditions::of_planner;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_node::node::{MissionNode, Severity};
@@ -57,8 +58,8 @@ struct PlannerNode {
     status_told: Option<msg::PlannerStatus>,
     strips: Vec<msg::Candidate>,
     last: Option<msg::ImagingTask>,
-    /// Alarm to raise at the first decision point: before, nobody may be listening yet.
-    missing: Option<(String, String)>,
+    /// Why another planner decides in its place, as it was told last.
+    fault_told: Option<String>,
     now: Tick,
     base: MissionNode,
 }
@@ -69,9 +70,6 @@ impl PlannerNode {
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
-        let missing = planner
-            .missing()
-            .map(|reason| (format!("no planner {spec}"), format!("{reason}; {} takes over", planner.name())));
         let gate = Gate::new(&base.mission.approval, base.model.period);
         let planner = GatedPlanner { gate, planner };
         Ok(Self {
@@ -87,8 +85,8 @@ impl PlannerNode {
             decisions: base.node.publisher(&graph::PLANNER_DECISION)?,
             strips: Vec::new(),
             last: None,
-            missing,
             now: Tick(0),
+            fault_told: None,
             base,
         })
     }
@@ -97,9 +95,6 @@ impl PlannerNode {
         while let Some(point) = self.points.take()? {
             if point.mission_over {
                 continue;
-            }
-            if let Some((name, text)) = self.missing.take() {
-                self.base.alarm(Severity::Error, &name, &text)?;
             }
             // The question again: the answer may have been lost.
             if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task) {
@@ -185,9 +180,9 @@ impl PlannerNode {
         let (Some(planned), Some(upcoming)) = (planned, self.logic.upcoming()) else { return Ok(()) };
         self.now = planned.situation.now;
         self.base.set_now(self.now);
-        if let Some(fault) = &planned.fault {
-            let text = format!("{fault}; {} takes over", planned.planner);
-            self.base.alarm(Severity::Error, "planner failed", &text)?;
+        if self.fault_told != planned.fault {
+            self.base.condition(&of_planner(self.now, planned.fault.as_deref(), &planned.planner))?;
+            self.fault_told.clone_from(&planned.fault);
         }
         let task = messages::imaging_task(&self.base.stamper, &planned, &self.strips);
         self.tasks.publish(&task)?;

@@ -81,7 +81,7 @@ impl SpacecraftNode {
             logic: SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon),
             clock: base.node.publisher(&graph::CLOCK)?,
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
-            truths: match base.mission.plant.noisy() {
+            truths: match base.mission.tells_truth_apart(base.model.period) {
                 true => Some(base.node.publisher(&graph::SPACECRAFT_TRUTH)?),
                 false => None,
             },

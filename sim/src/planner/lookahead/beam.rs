@@ -79,6 +79,14 @@ impl Planner for Beam {
         "beam".to_owned()
     }
 
+    fn forget(&mut self) {
+        self.experience.forget();
+    }
+
+    fn minds_wheels(&self) -> bool {
+        true
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let allowance = self.experience.learn(context);
         let best = self.search.sequences(context, &allowance).into_iter().next();

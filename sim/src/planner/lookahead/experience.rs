@@ -56,6 +56,11 @@ impl Experience {
         Self { fixed: Some(ticks), ..Self::default() }
     }
 
+    /// Forgets what it has learned; a margin that is fixed stays.
+    pub fn forget(&mut self) {
+        *self = Self { fixed: self.fixed, ..Self::default() };
+    }
+
     /// The fixed margin, if it is one [ticks].
     #[must_use]
     pub fn margin(&self) -> Option<u32> {

@@ -28,6 +28,14 @@ impl Planner for Lookahead {
         self.experience.margin().map_or_else(|| "lookahead".to_owned(), |ticks| format!("lookahead:{ticks}"))
     }
 
+    fn forget(&mut self) {
+        self.experience.forget();
+    }
+
+    fn minds_wheels(&self) -> bool {
+        true
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let allowance = self.experience.learn(context);
         let decision = best(context, &allowance);

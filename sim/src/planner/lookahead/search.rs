@@ -41,7 +41,7 @@ impl<'a> Search<'a> {
     pub fn new(model: &'a Model, situation: &Situation, allowance: &Allowance) -> Self {
         let mut flight = Flight::predicted(model, situation);
         if allowance.weakness > 0.0 {
-            flight.spacecraft.refit(model.plant.weakened(allowance.weakness));
+            flight.spacecraft.refit(model.plant.limited(&situation.wheels).weakened(allowance.weakness));
         }
         let mut begin = *situation;
         if allowance.delay > 0 {

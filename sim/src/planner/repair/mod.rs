@@ -57,6 +57,10 @@ impl Desk {
         Self { method, seed, memo: Memo::default(), rate: None }
     }
 
+    fn forget(&mut self) {
+        *self = Self::new(self.method, self.seed);
+    }
+
     /// A plan for the candidates of a decision, beginning from what is left of an earlier one: the strips in their order,
     /// each with the tick at which imaging begins.
     fn plan(
@@ -138,6 +142,12 @@ impl Planner for Repair {
         format!("repair{}", self.desk.method.ending())
     }
 
+    fn forget(&mut self) {
+        self.desk.forget();
+        self.experience.forget();
+        self.plan.clear();
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let allowance = self.experience.learn(context);
         let effort = Effort { ticks: self.ticks, rounds: ROUNDS };
@@ -202,6 +212,12 @@ fn flown(model: &Model, context: &DecisionContext<'_>, plan: &[(usize, Tick)]) -
 impl Planner for Aspen {
     fn name(&self) -> String {
         format!("aspen{}", self.desk.method.ending())
+    }
+
+    fn forget(&mut self) {
+        self.desk.forget();
+        self.plan.clear();
+        self.until = Tick(0);
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {

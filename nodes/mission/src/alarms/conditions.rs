@@ -1,0 +1,97 @@
+//! What nodes report of conditions that follow from the mission itself, so that each flight of it reports the same.
+
+use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::vehicle::health::Health;
+
+use super::board::{Board, Key};
+use super::definitions::Severity;
+use crate::faults::grammar::{Failure, Process, What};
+use crate::faults::plan::{FaultPlan, Scheduled};
+
+/// Who tells of what the satellite knows of itself.
+const GUIDANCE: &str = "guidance";
+/// Who tells of planners that are replaced.
+const PLANNER: &str = "planner";
+/// Who tells of lost nodes.
+const LAUNCHER: &str = "launcher";
+
+/// A node says whether something is wrong.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// When.
+    pub tick: Tick,
+    /// Which alarm.
+    pub key: Key,
+    /// Whether something is wrong.
+    pub wrong: bool,
+    /// What.
+    pub text: String,
+}
+
+impl Report {
+    fn new(tick: Tick, node: &str, name: &str, wrong: bool, text: String) -> Self {
+        Self { tick, key: Key::new(node, name), wrong, text }
+    }
+}
+
+/// Tells the board of reports, in the order of their ticks, and of the nodes' names at one tick, in which order ever they
+/// came.
+pub fn report_all(board: &mut Board, mut reports: Vec<Report>) {
+    reports.sort_by(|a, b| (a.tick, &a.key).cmp(&(b.tick, &b.key)));
+    for Report { tick, key, wrong, text } in reports {
+        board.report(tick, key, Severity::Error, wrong, &text);
+    }
+}
+
+/// What guidance reports of wheels and sensors.
+#[must_use]
+pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
+    let mut reports = Vec::new();
+    for (name, &share) in ["wheel x", "wheel y", "wheel z"].into_iter().zip(&health.wheels) {
+        let text = match share {
+            1.0 => "it gives what is commanded".to_owned(),
+            share if share <= 0.0 => "it gives no torque: only some strips can be pointed at".to_owned(),
+            share => format!("it gives {:.0} % of its torque limit", share * 100.0),
+        };
+        reports.push(Report::new(tick, GUIDANCE, name, share < 1.0, text));
+    }
+    let bias = health.gyro_bias.map(f64::to_degrees);
+    let text = format!("by {:.4}, {:.4} and {:.4} deg/s about x, y and z", bias.x, bias.y, bias.z);
+    reports.push(Report::new(tick, GUIDANCE, "gyro biased", health.biased(), text));
+    let text = if health.tracker_out { "the gyro carries the attitude on" } else { "it has an attitude" };
+    reports.push(Report::new(tick, GUIDANCE, "star tracker out", health.tracker_out, text.to_owned()));
+    reports
+}
+
+/// What the planner reports of a decision: why another one, `name`, made it in its place.
+#[must_use]
+pub fn of_planner(tick: Tick, replaced: Option<&str>, name: &str) -> Report {
+    let text = replaced.map_or_else(|| "it decides".to_owned(), |reason| format!("{reason}; {name} takes over"));
+    Report::new(tick, PLANNER, "planner replaced", replaced.is_some(), text)
+}
+
+/// What is reported of the faults by order that wheels and sensors do not show: when each begins and ends.
+#[must_use]
+pub fn of_plan(plan: &FaultPlan, period: TickPeriod) -> Vec<Report> {
+    let mut reports = Vec::new();
+    for it in plan.scheduled(period) {
+        let Some((node, name, text)) = planned(&it) else { continue };
+        reports.push(Report::new(it.from, node, &name, true, text));
+        let until = if matches!(it.what, What::Process(Process::Guidance, _)) { back(&it) } else { it.until };
+        reports.push(Report::new(until, node, &name, false, "over".to_owned()));
+    }
+    reports.sort_by_key(|report| report.tick);
+    reports
+}
+
+/// Tick at which a fresh guidance is there: it does not see the state at which the one before was lost.
+#[must_use]
+pub fn back(lost: &Scheduled) -> Tick {
+    lost.until.max(lost.from.after(1))
+}
+
+fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
+    let What::Process(process, failure) = it.what else { return None };
+    let text = if failure == Failure::Kill { "killed by order" } else { "hangs by order" };
+    Some((LAUNCHER, format!("{} lost", process.name()), text.to_owned()))
+}

@@ -1,0 +1,171 @@
+//! The alarms of a mission: what causes each, what it does to the mission, and what an operator does about it.
+
+use serde::{Deserialize, Serialize};
+use swath_sim::time::TickPeriod;
+
+use super::state::Rules;
+
+/// How grave an alarm is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing: the mission goes on as it is.
+    Warn,
+    /// Something does not work: the mission goes on with less.
+    Error,
+    /// The mission does not go on without somebody.
+    Critical,
+}
+
+impl Severity {
+    /// Its name in files and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Warn => "warn",
+            Self::Error => "error",
+            Self::Critical => "critical",
+        }
+    }
+}
+
+/// An alarm of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Definition {
+    /// Its name; the node that raises it is told beside it.
+    pub name: &'static str,
+    /// How grave it is.
+    pub severity: Severity,
+    /// Reports in a row before it is raised.
+    pub violations: u32,
+    /// How long nothing may be wrong before it returns [s of simulated time].
+    pub off_delay_s: f64,
+    /// Whether its reports tell of moments.
+    pub momentary: bool,
+    /// What causes it.
+    pub cause: &'static str,
+    /// What it does to the mission.
+    pub effect: &'static str,
+    /// What an operator does.
+    pub response: &'static str,
+}
+
+/// How long a moment stands [s].
+const MOMENT_S: f64 = 5.0;
+
+const fn lasting(name: &'static str, severity: Severity, words: [&'static str; 3]) -> Definition {
+    let [cause, effect, response] = words;
+    Definition { name, severity, violations: 1, off_delay_s: 1.0, momentary: false, cause, effect, response }
+}
+
+const fn moment(name: &'static str, severity: Severity, words: [&'static str; 3]) -> Definition {
+    Definition { off_delay_s: MOMENT_S, momentary: true, ..lasting(name, severity, words) }
+}
+
+/// A node is not there; the launcher tells of each by `NODE lost`.
+const NODE_LOST: Definition = lasting(
+    "lost",
+    Severity::Error,
+    [
+        "the process of the node has ended, or does not answer",
+        "what the node does is not done; the satellite flies on with what it has",
+        "nothing, if it returns within seconds; else look at its log and start it again",
+    ],
+);
+
+/// Every alarm that has a name of its own.
+pub const DEFINITIONS: &[Definition] = &[
+    lasting("wheel x", Severity::Error, WHEEL),
+    lasting("wheel y", Severity::Error, WHEEL),
+    lasting("wheel z", Severity::Error, WHEEL),
+    lasting(
+        "gyro biased",
+        Severity::Warn,
+        [
+            "rates from the gyro differ from the change of the star tracker's attitude",
+            "the rates are corrected by the difference; without a star tracker the attitude drifts",
+            "acknowledge; plan for a calibration",
+        ],
+    ),
+    lasting(
+        "star tracker out",
+        Severity::Warn,
+        [
+            "the star tracker repeats its last attitude",
+            "the attitude is carried on with the gyro, and is off by its errors in time",
+            "acknowledge; judge images of this time by their geometry",
+        ],
+    ),
+    lasting(
+        "planner replaced",
+        Severity::Error,
+        [
+            "the planner failed, is not there, or does not know what the satellite has lost",
+            "another planner decides in its place",
+            "look at the reason; choose another planner if it stays",
+        ],
+    ),
+    moment(
+        "planner late",
+        Severity::Warn,
+        [
+            "a task did not come before its deadline",
+            "the attitude is held for a while, then the planner is asked again",
+            "choose a faster planner or a longer deadline, if it goes on",
+        ],
+    ),
+];
+
+const WHEEL: [&str; 3] = [
+    "a reaction wheel gives less than three quarters of the torque commanded",
+    "slews take longer; with a wheel lost, only some strips can be pointed at",
+    "acknowledge; expect fewer images, and let a planner decide that flies slews in its head",
+];
+
+/// What holds for an alarm by name. `None` for one without a definition of its own, which tells of a moment.
+#[must_use]
+pub fn definition(name: &str) -> Option<&'static Definition> {
+    let lost = || name.ends_with(" lost").then_some(&NODE_LOST);
+    DEFINITIONS.iter().find(|definition| definition.name == name).or_else(lost)
+}
+
+/// When the condition of an alarm counts.
+#[must_use]
+pub fn rules(name: &str, period: TickPeriod) -> Rules {
+    let (violations, off_delay_s, momentary) =
+        definition(name).map_or((1, MOMENT_S, true), |it| (it.violations, it.off_delay_s, it.momentary));
+    Rules { violations, off_delay: period.ticks_ceil(off_delay_s), momentary }
+}
+
+/// The table as it stands in `docs/alarms.md`.
+#[must_use]
+pub fn table() -> String {
+    let mut text =
+        String::from("| alarm | severity | cause | effect | what to do |\n| --- | --- | --- | --- | --- |\n");
+    let node_lost = Definition { name: "*NODE* lost", ..NODE_LOST };
+    for it in DEFINITIONS.iter().chain([&node_lost]) {
+        let severity = it.severity.name();
+        text += &format!("| {} | {severity} | {} | {} | {} |\n", it.name, it.cause, it.effect, it.response);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_alarm_stands_in_the_documents() {
+        let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/alarms.md")).unwrap();
+        assert!(docs.contains(&table()), "docs/alarms.md lacks:\n{}", table());
+    }
+
+    #[test]
+    fn names_are_distinct_and_found() {
+        for definition in DEFINITIONS {
+            assert_eq!(super::definition(definition.name), Some(definition));
+        }
+        assert_eq!(definition("guidance lost").map(|it| it.severity), Some(Severity::Error));
+        assert_eq!(definition("task refused"), None);
+    }
+}

@@ -1,0 +1,344 @@
+//! The faults of a mission: checked against each other and against the mission, and as they act at its ticks.
+
+use serde::{Deserialize, Serialize};
+use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::vehicle::faults::{FOR_GOOD, TimedFault};
+use thiserror::Error;
+
+use super::grammar::{Failure, PlannedFault, Process, What};
+use super::random;
+
+/// `[faults]` of a mission file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FaultPlan {
+    /// What fails, such as `guidance:kill@120s`.
+    pub plan: Vec<PlannedFault>,
+    /// Number of faults that are drawn from the mission's seed besides.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub random: u32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_zero(number: &u32) -> bool {
+    *number == 0
+}
+
+/// Most faults of a mission.
+pub const FAULTS_MAX: usize = 1000;
+
+/// Why faults cannot be flown.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum FaultPlanError {
+    /// It would begin before now.
+    #[error("{fault} is past: it is {now_s} s now")]
+    Past {
+        /// The fault.
+        fault: PlannedFault,
+        /// Now [s].
+        now_s: f64,
+    },
+    /// The mission is over by then.
+    #[error("{fault} comes too late: the mission ends at {end_s} s")]
+    AfterEnd {
+        /// The fault.
+        fault: PlannedFault,
+        /// End of the mission [s].
+        end_s: f64,
+    },
+    /// Two cannot act at the same time.
+    #[error("{first} and {second} contradict each other: both change {part} at the same time")]
+    Contradiction {
+        /// The one.
+        first: Box<PlannedFault>,
+        /// The other.
+        second: Box<PlannedFault>,
+        /// What both change.
+        part: &'static str,
+    },
+    /// The spacecraft cannot be away for a time that it counts itself.
+    #[error(
+        "{fault}: the spacecraft owns the clock, so that it cannot be away for simulated time; leave out +{for_s}s"
+    )]
+    OwnsTheClock {
+        /// The fault.
+        fault: PlannedFault,
+        /// How long it was to be [s].
+        for_s: f64,
+    },
+    /// It cannot be made to happen where the mission is flown.
+    #[error("{fault} cannot be flown {place}: {can}")]
+    NotHere {
+        /// The fault.
+        fault: PlannedFault,
+        /// Where the mission is flown.
+        place: &'static str,
+        /// What can fail there.
+        can: &'static str,
+    },
+    /// There are too many.
+    #[error("{count} faults are planned, the most are {FAULTS_MAX}")]
+    TooMany {
+        /// How many.
+        count: usize,
+    },
+}
+
+/// A fault at its ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scheduled {
+    /// What fails.
+    pub what: What,
+    /// First tick at which it acts.
+    pub from: Tick,
+    /// First tick at which it does not act any more. A process that is replaced at once has the tick of its end.
+    pub until: Tick,
+}
+
+impl Scheduled {
+    /// A fault that is ordered at `now`.
+    #[must_use]
+    pub fn new(fault: &PlannedFault, now: Tick, period: TickPeriod) -> Self {
+        let from = fault.at_s.map_or(now, |at_s| Tick(ticks(at_s, period)));
+        let until = match (fault.for_s, fault.what) {
+            (Some(for_s), _) => Tick(from.0 + ticks(for_s, period).max(1)),
+            (None, What::Process(..)) => from,
+            (None, _) => FOR_GOOD,
+        };
+        Self { what: fault.what, from, until }
+    }
+
+    /// Whether both act at some tick.
+    fn meets(&self, other: &Self) -> bool {
+        let last = |it: &Self| Tick(it.until.0.max(it.from.0 + 1));
+        self.from < last(other) && other.from < last(self)
+    }
+}
+
+/// Whole ticks of a time, rounded up.
+fn ticks(seconds: f64, period: TickPeriod) -> u64 {
+    (seconds / period.seconds() - 1e-9).ceil().max(0.0) as u64
+}
+
+impl FaultPlan {
+    /// Whether nothing fails.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.plan.is_empty() && self.random == 0
+    }
+
+    /// The same with the faults drawn that are to be drawn.
+    #[must_use]
+    pub fn resolved(mut self, seed: u64, horizon: Tick, period: TickPeriod) -> Self {
+        for fault in random::draw(seed, std::mem::take(&mut self.random), horizon, period) {
+            self.plan.push(fault);
+            if check(&self.plan, Tick(0), horizon, period).is_err() {
+                self.plan.pop();
+            }
+        }
+        self
+    }
+
+    /// Checks the faults of a mission against each other and against its length.
+    ///
+    /// # Errors
+    /// The first fault that cannot be flown.
+    pub fn validate(&self, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
+        check(&self.plan, Tick(0), horizon, period)
+    }
+
+    /// Checks that a mission in one process can fly the faults: there are no messages, stores and bags in it.
+    ///
+    /// # Errors
+    /// The first that it cannot.
+    pub fn fits_one_process(&self) -> Result<(), FaultPlanError> {
+        let flown = |what: What| match what {
+            What::Vehicle(_) => true,
+            What::Process(process, _) => Process::IN_PROCESS.contains(&process),
+            What::Drop(_) | What::StoreFull | What::BagFull => false,
+        };
+        let can = "wheels, gyro, star tracker, guidance, planner and request_manager can fail there";
+        self.each(flown, "in one process", can)
+    }
+
+    /// Checks that a mission over DDS can fly the faults.
+    ///
+    /// # Errors
+    /// The first that it cannot.
+    pub fn fits_dds(&self) -> Result<(), FaultPlanError> {
+        let can = "wheels, gyro and star tracker can fail there; nodes fail by order with --in-process";
+        self.each(|what| matches!(what, What::Vehicle(_)), "over DDS", can)
+    }
+
+    fn each(&self, flown: impl Fn(What) -> bool, place: &'static str, can: &'static str) -> Result<(), FaultPlanError> {
+        match self.plan.iter().find(|fault| !flown(fault.what)) {
+            Some(&fault) => Err(FaultPlanError::NotHere { fault, place, can }),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds a fault that is ordered at `now`.
+    ///
+    /// # Errors
+    /// When it is past, comes after the end, or contradicts another one.
+    pub fn order(
+        &mut self,
+        mut fault: PlannedFault,
+        now: Tick,
+        horizon: Tick,
+        period: TickPeriod,
+    ) -> Result<Scheduled, FaultPlanError> {
+        let now_s = period.time_s(now);
+        if fault.at_s.is_some_and(|at_s| at_s < now_s) {
+            return Err(FaultPlanError::Past { fault, now_s });
+        }
+        fault.at_s = fault.at_s.or(Some(now_s));
+        self.plan.push(fault);
+        if let Err(error) = check(&self.plan, now, horizon, period) {
+            self.plan.pop();
+            return Err(error);
+        }
+        Ok(Scheduled::new(&fault, now, period))
+    }
+
+    /// All faults at their ticks, in the order in which they begin.
+    #[must_use]
+    pub fn scheduled(&self, period: TickPeriod) -> Vec<Scheduled> {
+        let mut all: Vec<_> = self.plan.iter().map(|fault| Scheduled::new(fault, Tick(0), period)).collect();
+        all.sort_by_key(|it| it.from);
+        all
+    }
+
+    /// The faults of wheels and sensors.
+    #[must_use]
+    pub fn vehicle(&self, period: TickPeriod) -> Vec<TimedFault> {
+        let of = |it: Scheduled| match it.what {
+            What::Vehicle(fault) => Some(TimedFault { fault, from: it.from, until: it.until }),
+            _ => None,
+        };
+        self.scheduled(period).into_iter().filter_map(of).collect()
+    }
+
+    /// The faults of a node.
+    #[must_use]
+    pub fn of(&self, process: Process, period: TickPeriod) -> Vec<(Scheduled, Failure)> {
+        let of = |it: Scheduled| match it.what {
+            What::Process(other, failure) if other == process => Some((it, failure)),
+            _ => None,
+        };
+        self.scheduled(period).into_iter().filter_map(of).collect()
+    }
+}
+
+fn check(plan: &[PlannedFault], now: Tick, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
+    if plan.len() > FAULTS_MAX {
+        return Err(FaultPlanError::TooMany { count: plan.len() });
+    }
+    let scheduled: Vec<_> = plan.iter().map(|fault| Scheduled::new(fault, now, period)).collect();
+    for (i, (&fault, it)) in plan.iter().zip(&scheduled).enumerate() {
+        if let (What::Process(Process::Spacecraft, _), Some(for_s)) = (fault.what, fault.for_s) {
+            return Err(FaultPlanError::OwnsTheClock { fault, for_s });
+        }
+        if it.from >= horizon {
+            return Err(FaultPlanError::AfterEnd { fault, end_s: period.time_s(horizon) });
+        }
+        for (&second, other) in plan.iter().zip(&scheduled).skip(i + 1) {
+            let part = fault.what.part();
+            if part == second.what.part() && it.meets(other) {
+                return Err(FaultPlanError::Contradiction { first: Box::new(fault), second: Box::new(second), part });
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HORIZON: Tick = Tick(2000);
+
+    fn period() -> TickPeriod {
+        TickPeriod::from_frequency(2.0).unwrap()
+    }
+
+    fn plan(texts: &[&str]) -> FaultPlan {
+        FaultPlan { plan: texts.iter().map(|text| text.parse().unwrap()).collect(), random: 0 }
+    }
+
+    #[test]
+    fn faults_that_cannot_be_flown_are_named() {
+        for (texts, words) in [
+            (&["wheel2:dead@600s", "wheel2:stuck@700s"][..], "wheel2:dead@600s and wheel2:stuck@700s contradict"),
+            (&["planner:kill@10s+60s", "planner:hang@30s"], "both change planner at the same time"),
+            (&["gyro:bias 0.1deg/s@5s", "gyro:bias 0.2deg/s@9s"], "both change gyro"),
+            (&["guidance:kill@5s", "guidance:hang@5s"], "both change guidance"),
+            (&["planner:kill@1000s"], "planner:kill@1000s comes too late: the mission ends at 1000 s"),
+            (&["spacecraft:kill@10s+5s"], "the spacecraft owns the clock"),
+        ] {
+            let error = plan(texts).validate(HORIZON, period()).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        let fine = plan(&[
+            "wheel2:dead@600s+100s",
+            "wheel2:stuck@700s",
+            "wheel1:dead@650s",
+            "guidance:kill@5s",
+            "guidance:kill@6s",
+            "spacecraft:kill@10s",
+            "store:full+10s",
+        ]);
+        assert_eq!(fine.validate(HORIZON, period()), Ok(()));
+    }
+
+    #[test]
+    fn what_cannot_fail_where_it_is_flown_is_named() {
+        let refused = |texts: &[&str], dds: bool| {
+            let plan = plan(texts);
+            let checked = if dds { plan.fits_dds() } else { plan.fits_one_process() };
+            checked.map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(&["wheel1:dead@5s", "guidance:kill@5s", "request_manager:hang@5s+9s"], false), Ok(()));
+        assert_eq!(refused(&["wheel1:dead@5s", "startracker:out@5s"], true), Ok(()));
+        for (text, dds) in [("store:full", false), ("topic:drop 5%@1s", false), ("spacecraft:kill@5s", false)] {
+            let error = refused(&[text], dds).unwrap_err();
+            assert!(error.starts_with(&format!("{text} cannot be flown in one process: wheels, gyro")), "{error}");
+        }
+        let error = refused(&["gyro:bias 0.1deg/s@5s", "planner:kill@9s"], true).unwrap_err();
+        assert!(error.starts_with("planner:kill@9s cannot be flown over DDS"), "{error}");
+    }
+
+    #[test]
+    fn orders_in_flight_are_checked_against_now() {
+        let mut plan = plan(&["wheel2:dead@600s"]);
+        let mut order = |text: &str| plan.order(text.parse().unwrap(), Tick(400), HORIZON, period());
+        let error = order("guidance:kill@199s").unwrap_err().to_string();
+        assert_eq!(error, "guidance:kill@199s is past: it is 200 s now");
+        assert!(order("wheel2:weak 50%").is_err(), "it would last until the wheel is dead, and beyond");
+        let scheduled = order("wheel2:weak 50%+100s").unwrap();
+        assert_eq!((scheduled.from, scheduled.until), (Tick(400), Tick(600)));
+        assert_eq!(order("startracker:out").unwrap().until, FOR_GOOD);
+        assert_eq!(order("planner:kill@250.1s+0.1s").map(|it| (it.from, it.until)), Ok((Tick(501), Tick(502))));
+    }
+
+    #[test]
+    fn what_is_drawn_follows_from_the_seed_and_can_be_flown() {
+        let mut differ = 0;
+        for seed in 0..200 {
+            let drawn = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, HORIZON, period());
+            assert_eq!(drawn, FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, HORIZON, period()));
+            assert!(!drawn.plan.is_empty() && drawn.random == 0);
+            assert_eq!(drawn.validate(HORIZON, period()), Ok(()), "{drawn:?}");
+            let texts: Vec<String> = drawn.plan.iter().map(ToString::to_string).collect();
+            let read: Vec<PlannedFault> = texts.iter().map(|text| text.parse().unwrap()).collect();
+            assert_eq!(read, drawn.plan);
+            differ += usize::from(texts != plan_of(seed + 1));
+        }
+        assert!(differ > 190);
+    }
+
+    fn plan_of(seed: u64) -> Vec<String> {
+        let drawn = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, HORIZON, period());
+        drawn.plan.iter().map(ToString::to_string).collect()
+    }
+}
