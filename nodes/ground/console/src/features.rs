@@ -54,7 +54,7 @@ const JSON: &str = "application/json";
 const GEOJSON: &str = "application/geo+json";
 
 /// The landing page.
-#[utoipa::path(get, path = "", tag = "features", responses((status = 200, body = Value), Problem))]
+#[utoipa::path(get, path = "/", tag = "features", responses((status = 200, body = Value), Problem))]
 async fn landing(State(server): Home, headers: HeaderMap) -> Json<Value> {
     let base = base(&server, &headers);
     let description = base.replace("/features", "/api/openapi.json");

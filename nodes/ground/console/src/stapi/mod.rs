@@ -40,7 +40,7 @@ pub fn routes() -> OpenApiRouter<Arc<Server>> {
 }
 
 /// The landing page.
-#[utoipa::path(get, path = "", tag = "stapi", responses((status = 200, body = Landing), Problem))]
+#[utoipa::path(get, path = "/", tag = "stapi", responses((status = 200, body = Landing), Problem))]
 async fn landing(State(server): Home, headers: HeaderMap) -> Json<Landing> {
     let links = Links::of(&server, &headers);
     Json(Landing {
