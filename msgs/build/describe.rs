@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use crate::model::{Base, Field, Message, Primitive, Service, Shape};
+use crate::model::{Base, Field, Message, Primitive, Service, Shape, Value};
 
 /// All messages known, by type name; services' halves included.
 pub type Catalogue = BTreeMap<String, Message>;
@@ -66,6 +66,32 @@ pub fn message_hash(catalogue: &Catalogue, message: &Message) -> Result<String, 
     Ok(hash(&description(&message.type_name(), &message.fields), &referenced))
 }
 
+/// The message and all that it is made of, as type_description_interfaces/msg/TypeDescription has it, in JSON.
+pub fn message_description(catalogue: &Catalogue, message: &Message) -> Result<String, String> {
+    let full = |message: &Message| {
+        let member = |field: &Field| {
+            let (name, kind, default) = (&field.name, type_json(field), field.default.as_ref().map(default_text));
+            format!(r#"{{"name": "{name}", "type": {kind}, "default_value": {:?}}}"#, default.unwrap_or_default())
+        };
+        let members: Vec<String> = message.fields.iter().map(member).collect();
+        description_of_members(&message.type_name(), &members)
+    };
+    let referenced: Vec<String> = dependencies(catalogue, message)?.iter().map(|name| full(&catalogue[name])).collect();
+    Ok(whole(&full(message), &referenced.iter().map(String::as_str).collect::<Vec<_>>()))
+}
+
+/// A default as ROS's own generators write it, in Python's words.
+fn default_text(value: &Value) -> String {
+    match value {
+        Value::Bool(true) => "True".to_owned(),
+        Value::Bool(false) => "False".to_owned(),
+        Value::Int(value) => value.to_string(),
+        Value::Float(value) => format!("{value:?}"),
+        Value::Text(text) => text.clone(),
+        Value::List(values) => format!("[{}]", values.iter().map(default_text).collect::<Vec<_>>().join(", ")),
+    }
+}
+
 /// Type hash of a service, which covers its request, response and event types.
 pub fn service_hash(catalogue: &Catalogue, service: &Service) -> Result<String, String> {
     let name = format!("{}/srv/{}", service.package, service.name);
@@ -106,15 +132,16 @@ fn with_newline(text: &str) -> String {
 
 fn hash(description: &str, referenced: &BTreeMap<String, String>) -> String {
     let referenced: Vec<&str> = referenced.values().map(String::as_str).collect();
-    let json = format!(
-        r#"{{"type_description": {description}, "referenced_type_descriptions": [{}]}}"#,
-        referenced.join(", ")
-    );
+    let json = whole(description, &referenced);
     let mut hash = "RIHS01_".to_owned();
     for byte in Sha256::digest(json) {
         let _ = write!(hash, "{byte:02x}");
     }
     hash
+}
+
+fn whole(description: &str, referenced: &[&str]) -> String {
+    format!(r#"{{"type_description": {description}, "referenced_type_descriptions": [{}]}}"#, referenced.join(", "))
 }
 
 fn description(type_name: &str, fields: &[Field]) -> String {

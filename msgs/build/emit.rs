@@ -64,12 +64,14 @@ fn emit_message(out: &mut String, catalogue: &Catalogue, message: &Message) -> R
             const TYPE_NAME: &'static str = {:?};
             const TYPE_HASH: &'static str = {:?};
             const SCHEMA: &'static str = {:?};
+            const DESCRIPTION: &'static str = {:?};
         }}",
         message.package,
         message.name,
         message.type_name(),
         describe::message_hash(catalogue, message)?,
-        describe::schema(catalogue, message)?
+        describe::schema(catalogue, message)?,
+        describe::message_description(catalogue, message)?
     );
     Ok(())
 }

@@ -38,6 +38,8 @@ pub trait RosMessage:
     const TYPE_HASH: &'static str;
     /// Definition as bags store it: the text, then the text of each dependency.
     const SCHEMA: &'static str;
+    /// The type as [`type_description_interfaces::TypeDescription`] has it, in JSON.
+    const DESCRIPTION: &'static str;
 }
 
 /// A ROS 2 service.
@@ -65,13 +67,15 @@ pub struct Interface {
     pub type_hash: &'static str,
     /// Definition as bags store it: the text, then the text of each dependency.
     pub schema: &'static str,
+    /// The type as [`type_description_interfaces::TypeDescription`] has it, in JSON.
+    pub description: &'static str,
 }
 
 impl Interface {
     /// The interface of a message type.
     #[must_use]
     pub const fn of<M: RosMessage>() -> Self {
-        Self { type_name: M::TYPE_NAME, type_hash: M::TYPE_HASH, schema: M::SCHEMA }
+        Self { type_name: M::TYPE_NAME, type_hash: M::TYPE_HASH, schema: M::SCHEMA, description: M::DESCRIPTION }
     }
 
     /// The interface with this full name, such as `std_msgs/msg/Header`, if it is one of ours.

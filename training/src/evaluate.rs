@@ -1,9 +1,11 @@
 //! Missions flown by planners on the same seeds, and statistics of what came out.
 
+use std::fmt;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::model::Model;
@@ -13,6 +15,8 @@ use swath_sim::vehicle::errors::PlantErrors;
 
 use crate::error::{Result, TrainingError};
 use crate::planners::Prepared;
+
+pub use swath_sim::learn::score::Score as Mission;
 
 /// Which missions to fly.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,37 +31,67 @@ pub struct Missions {
     pub first_seed: u64,
     /// How many.
     pub count: u64,
+    /// The share of them that is flown here; all without.
+    pub shard: Option<Shard>,
 }
 
-/// One mission flown. What no attempt, or no image, tells is `None`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Mission {
-    /// Its seed.
-    pub seed: u64,
-    /// Strips asked for.
-    pub requests: usize,
-    /// Those of them that have a window in which they can be imaged, up to 1.5 orbits past the mission's end.
-    pub reachable: usize,
-    /// Sum of the priorities of imaged strips, per orbit.
-    pub reward_per_orbit: f64,
-    /// Share of the attempts that succeeded.
-    pub success_rate: Option<f64>,
-    /// Attempts per orbit.
-    pub attempts_per_orbit: f64,
-    /// Strips imaged per orbit.
-    pub imaged_per_orbit: f64,
-    /// Mean transition time of attempts [s].
-    pub t_pre_s: Option<f64>,
-    /// Mean acquisition time of attempts [s].
-    pub t_acq_s: Option<f64>,
-    /// Mean priority of imaged strips.
-    pub priority: Option<f64>,
-    /// Time spent waiting, per orbit [s].
-    pub wait_s_per_orbit: f64,
-    /// Share of the attempts that failed for attitude.
-    pub failed_attitude: Option<f64>,
-    /// Share of the attempts that failed for elevation.
-    pub failed_elevation: Option<f64>,
+/// A share of missions: of every `of` that follow each other the one with this number, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Shard {
+    number: u64,
+    of: u64,
+}
+
+impl Shard {
+    /// Its number, from 1.
+    #[must_use]
+    pub fn number(self) -> u64 {
+        self.number
+    }
+
+    /// How many shares there are.
+    #[must_use]
+    pub fn of(self) -> u64 {
+        self.of
+    }
+
+    /// How many of `count` missions are its own.
+    fn count(self, count: u64) -> u64 {
+        count / self.of + u64::from(self.number <= count % self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((number, of)) if (1..=of).contains(&number) => Ok(Self { number, of }),
+            _ => Err(format!("`{text}` is no share: expected I/N with I from 1 to N, such as 2/8")),
+        }
+    }
+}
+
+impl TryFrom<String> for Shard {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
 }
 
 /// A mean over missions.
@@ -72,10 +106,10 @@ pub struct Spread {
 }
 
 impl Missions {
-    /// The seeds of the missions.
+    /// The seeds of the missions that are flown here.
     ///
     /// # Errors
-    /// No mission, or seeds that run beyond the greatest one.
+    /// No mission, seeds that run beyond the greatest one, or a share without a mission.
     pub fn seeds(&self) -> Result<impl IndexedParallelIterator<Item = u64> + use<>> {
         let refused = |value: u64, limit: String| TrainingError::Setting {
             key: "seed of the first mission".into(),
@@ -90,8 +124,21 @@ impl Missions {
             return Err(refused(self.first_seed, limit));
         }
         let first = self.first_seed;
-        let count = usize::try_from(self.count).map_err(|_| refused(self.count, "a number of missions".into()))?;
-        Ok((0..count).into_par_iter().map(move |index| first + index as u64))
+        let whole = Shard { number: 1, of: 1 };
+        let shard = self.shard.unwrap_or(whole);
+        let own = shard.count(self.count);
+        if own == 0 {
+            let none = format!("shard {shard} has no mission: there are only {} of them", self.count);
+            return Err(TrainingError::NoResult(none));
+        }
+        let own = usize::try_from(own).map_err(|_| refused(self.count, "a number of missions".into()))?;
+        Ok((0..own).into_par_iter().map(move |index| first + index as u64 * shard.of + (shard.number - 1)))
+    }
+
+    /// How many missions are flown here.
+    #[must_use]
+    pub fn own(&self) -> u64 {
+        self.shard.map_or(self.count, |shard| shard.count(self.count))
     }
 }
 
@@ -109,6 +156,7 @@ impl Missions {
 ///     plant: Default::default(),
 ///     first_seed: 7,
 ///     count: 2,
+///     shard: None,
 /// };
 /// let planners = [Prepared::new(&"heuristic:80".parse()?)?, Prepared::new(&"hop-ppo".parse()?)?];
 /// let flown = fly(&missions, &planners, || {})?;
@@ -138,7 +186,9 @@ pub fn fly(missions: &Missions, planners: &[Prepared], each: impl Fn() + Sync) -
             flown
         })
         .collect::<Result<_>>()?;
-    attempted(by_seed.iter().flatten())?;
+    if missions.shard.is_none() {
+        attempted(by_seed.iter().flatten())?;
+    }
     let of = |index: usize| by_seed.iter().map(|row| row[index]).collect();
     Ok((0..planners.len()).map(of).collect())
 }
@@ -163,26 +213,9 @@ pub fn attempted<'a>(missions: impl Iterator<Item = &'a Mission> + Clone) -> Res
 /// # Errors
 /// When the planner fails.
 pub fn mission(mut env: Env, planner: &mut dyn Planner, episode: &EpisodeConfig, seed: u64) -> Result<Mission> {
-    let (period, orbits) = (env.model().period, episode.orbits);
     let mut totals = Totals::default();
     env.run(planner, |record| totals.add(record)).map_err(TrainingError::environment)?;
-    let seconds = |ticks: u64| ticks as f64 * period.seconds();
-    let of_attempts = |sum: f64| (totals.attempts > 0).then(|| sum / totals.attempts as f64);
-    Ok(Mission {
-        seed,
-        requests: episode.scenario.count_of(seed),
-        reachable: env.catalogue().len(),
-        reward_per_orbit: totals.reward / orbits,
-        success_rate: of_attempts(totals.fulfilled as f64),
-        attempts_per_orbit: totals.attempts as f64 / orbits,
-        imaged_per_orbit: totals.fulfilled as f64 / orbits,
-        t_pre_s: of_attempts(seconds(totals.t_pre_ticks)),
-        t_acq_s: of_attempts(seconds(totals.t_acq_ticks)),
-        priority: (totals.fulfilled > 0).then(|| totals.reward / totals.fulfilled as f64),
-        wait_s_per_orbit: seconds(totals.wait_ticks) / orbits,
-        failed_attitude: of_attempts(totals.failed_attitude as f64),
-        failed_elevation: of_attempts(totals.failed_elevation as f64),
-    })
+    Ok(Mission::of(&env, &totals, episode.orbits, seed, episode.scenario.count_of(seed)))
 }
 
 /// Mean, deviation and confidence of a quantity over the missions that have it; `None` when none has.
@@ -242,11 +275,40 @@ mod tests {
     fn missions(strips: u32, first_seed: u64, count: u64) -> Missions {
         let mut episode = EpisodeConfig { orbits: 1.0, ..EpisodeConfig::default() };
         episode.scenario.count = [strips; 2];
-        Missions { simulation: SimConfig::default(), episode, plant: PlantErrors::default(), first_seed, count }
+        Missions {
+            simulation: SimConfig::default(),
+            episode,
+            plant: PlantErrors::default(),
+            first_seed,
+            count,
+            shard: None,
+        }
     }
 
     fn heuristic() -> [Prepared; 1] {
         [Prepared::new(&PlannerSpec::Heuristic(90.0)).unwrap()]
+    }
+
+    #[test]
+    fn shards_share_the_seeds_out_and_leave_none() {
+        for (count, of) in [(10, 3), (10, 1), (7, 7), (100, 8)] {
+            let of_shard = |number: u64| {
+                let shard = Some(format!("{number}/{of}").parse().unwrap());
+                let missions = Missions { shard, ..missions(50, 5, count) };
+                let seeds: Vec<u64> = missions.seeds().unwrap().collect();
+                assert_eq!(seeds.len() as u64, missions.own());
+                seeds
+            };
+            let mut all: Vec<u64> = (1..=of).flat_map(of_shard).collect();
+            all.sort_unstable();
+            assert_eq!(all, (5..5 + count).collect::<Vec<u64>>());
+        }
+        for text in ["5/4", "0/4", "1/0", "1", "a/b", "-1/2", "1/2/3"] {
+            assert!(text.parse::<Shard>().unwrap_err().contains("expected I/N"), "{text}");
+        }
+        let empty = Missions { shard: Some("3/4".parse().unwrap()), ..missions(50, 0, 2) };
+        let error = empty.seeds().map(|_| ()).unwrap_err().to_string();
+        assert!(error.ends_with("shard 3/4 has no mission: there are only 2 of them"), "{error}");
     }
 
     #[test]

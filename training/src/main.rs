@@ -25,6 +25,8 @@ enum Command {
     Evaluate(command::evaluate::EvaluateArgs),
     /// Fly the heuristic with fixed transition times of 10 to 120 s
     Sweep(command::evaluate::SweepArgs),
+    /// Put the parts of an evaluation, a sweep or ground plans together that were flown with --shard
+    Merge(command::campaign::MergeArgs),
     /// Draw the paper's Figures 3, 4 and 5 from recorded runs and evaluations
     Figures(command::figures::FiguresArgs),
 }
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         Command::GroundPlan(args) => command::ground_plan::ground_plan(&args),
         Command::Evaluate(args) => command::evaluate::evaluate(&args),
         Command::Sweep(args) => command::evaluate::sweep(&args),
+        Command::Merge(args) => command::campaign::merge(&args),
         Command::Figures(args) => command::figures::figures(&args),
     };
     match outcome {

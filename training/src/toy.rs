@@ -122,6 +122,7 @@ impl Environment for Toy {
             reward: worth * share,
             duration_s,
             success: share > 0.9,
+            failure: None,
             progress: if self.step == STEPS { Progress::Truncated } else { Progress::Continues },
         })
     }

@@ -251,3 +251,69 @@ fn every_shipped_policy_can_be_made_again_by_the_command_on_its_card() {
         assert!(card.contains(policy.digest()), "the card of {name} names {}", policy.digest());
     }
 }
+
+/// A campaign in parts is the campaign in one piece, whatever their number and order.
+#[test]
+fn parts_are_merged_into_what_one_piece_gives() {
+    let case = Case::new(TOY);
+    let campaigns: [&[&str]; 4] = [
+        &["evaluate", "--planner", "heuristic:80", "--planner", "beam"],
+        &["evaluate", "--planner", "random", "--plant", "none", "--plant", "torque-10%"],
+        &["sweep"],
+        &["ground-plan", "--width", "1", "--branches", "2"],
+    ];
+    let size = ["--episodes", "3", "--orbits", "0.3", "--seed", "3"];
+    for campaign in campaigns {
+        succeeded(&case.run(&[campaign, &size, &["--json", "whole.json"]].concat()));
+        let table = case.run(&[campaign, &size].concat());
+        let shares: &[u64] = if *campaign == ["sweep"] { &[1, 2, 3] } else { &[2] };
+        for &of in shares {
+            let parts: Vec<String> = (1..=of).rev().map(|number| format!("part-{number}-{of}.json")).collect();
+            for (number, part) in (1..=of).rev().zip(&parts) {
+                let shard = format!("{number}/{of}");
+                succeeded(&case.run(&[campaign, &size, &["--shard", &shard, "--json", part]].concat()));
+            }
+            let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+            let merged = case.run(&[&["merge", "--json", "merged.json"], &parts[..]].concat());
+            succeeded(&merged);
+            let read = |name: &str| std::fs::read(case.path(name)).unwrap();
+            assert_eq!(read("merged.json"), read("whole.json"), "{campaign:?} in {of}");
+            assert_eq!(merged.stdout, table.stdout, "{campaign:?} in {of}");
+        }
+    }
+}
+
+#[test]
+fn parts_that_are_missing_double_or_foreign_are_named() {
+    let case = Case::new(TOY);
+    let part = |shard: &str, name: &str, more: &[&str]| {
+        let words = ["evaluate", "--planner", "heuristic:80", "--episodes", "4", "--orbits", "0.2", "--shard", shard];
+        succeeded(&case.run(&[&words, more, &["--json", name]].concat()));
+    };
+    for number in 1..=4 {
+        part(&format!("{number}/4"), &format!("{number}.json"), &[]);
+    }
+    part("2/4", "other.json", &["--requests", "2500"]);
+    part("2/3", "thirds.json", &[]);
+    std::fs::write(case.path("no.json"), "{}").unwrap();
+    let refused = |parts: &[&str], text: &str| {
+        let output = case.run(&[&["merge"], parts].concat());
+        assert_eq!(output.status.code(), Some(1));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains(text), "{said}");
+    };
+    refused(&["1.json", "3.json"], "2 of 4 shards are missing: 2/4, 4/4");
+    refused(&["1.json", "2.json", "1.json"], "shard 1/4 is there twice: 1.json and 1.json");
+    let foreign = "other.json is of another campaign: head.configuration.episode.scenario.count is [2500,2500] there and \
+                   [2000,5000] in 1.json";
+    refused(&["1.json", "other.json", "3.json", "4.json"], foreign);
+    refused(&["1.json", "thirds.json"], "thirds.json is of another campaign: shards is 3 there and 4 in 1.json");
+    refused(&["1.json", "no.json"], "no.json is no part of a campaign");
+    refused(&["1.json", "nowhere.json"], "cannot read nowhere.json");
+    for (shard, text) in [("5/4", "`5/4` is no share: expected I/N with I from 1 to N"), ("0/2", "`0/2` is no share")] {
+        let output = case.run(&["sweep", "--shard", shard, "--json", "part.json"]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(String::from_utf8(output.stderr).unwrap().contains(text));
+    }
+    assert_eq!(case.run(&["sweep", "--shard", "1/2"]).status.code(), Some(2), "a part needs a file");
+}

@@ -1,4 +1,4 @@
-//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|chaos|soak|ament`.
+//! Set-up and the commands of the README: `cargo xtask setup|test|mission|lint|bench|chaos|wheel|web|soak|ament`.
 
 mod ament;
 mod bench;
@@ -9,6 +9,8 @@ mod prerequisites;
 mod process;
 mod soak;
 mod venv;
+mod web;
+mod wheel;
 
 use std::ffi::OsString;
 use std::io::Write as _;
@@ -25,21 +27,25 @@ usage: cargo xtask COMMAND
 
   setup [--test]   make what is missing: the libtorch view (one download of
                    543 MB), and with --test the Python environment of the tests
-  test [ARGS…]     set up, then run every test of the workspace; ARGS go to
-                   `cargo test`
+  test [ARGS…]     set up, then run every test of the workspace and of the
+                   Python package; with ARGS, `cargo test ARGS…` alone
   mission [ARGS…]  set up, build, and fly examples/missions/one_orbit.toml; ARGS
                    go to `swath launch` (--help shows them)
   lint             check format, clippy, licences and sources of dependencies, and
                    that all of them are used; builds the tools that are missing
   bench            run every crate's measurements and print one JSON object
+  wheel            build the Python package into target/wheels
   chaos [--first SEED] --seeds N
                    fly N missions whose faults are drawn from their seeds, check what
                    must hold whatever fails, and print what repeats a failure
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
+  web              test and build the console's page with npm, from its sources into
+                   the files that the program holds
   ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
                    in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
+  soak python      run the Python package's long examples; they fetch gigabytes
 ";
 
 fn main() -> ExitCode {
@@ -64,8 +70,10 @@ fn run(args: &[OsString]) -> Result<()> {
         Some("mission") => mission(&root, rest),
         Some("lint") => lint(&root, rest),
         Some("bench") => bench(&root, rest),
+        Some("wheel") => wheel(&root, rest),
         Some("chaos") => chaos(&root, rest),
         Some("soak") => soak(&root, rest),
+        Some("web") => web(&root, rest),
         Some("ament") => ament(&root, rest),
         Some("help" | "--help" | "-h") => {
             eprint!("{USAGE}");
@@ -101,7 +109,29 @@ fn test(root: &Path, args: &[OsString]) -> Result<()> {
     let mut cargo = process::cargo(root, "test");
     cargo.args(["--release", "--workspace"]).args(args);
     cargo.env("SWATH_PYTHON", venv::python(root));
-    process::run(&mut cargo)
+    process::run(&mut cargo)?;
+    if !args.is_empty() {
+        return Ok(());
+    }
+    let wheel = wheel::build(root)?;
+    wheel::install(root, &wheel)?;
+    wheel::test(root, &wheel)
+}
+
+fn wheel(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("wheel takes no arguments\n\n{USAGE}");
+    }
+    python_tools(root)?;
+    eprintln!("built {}", wheel::build(root)?.display());
+    Ok(())
+}
+
+/// What builds a wheel, without libtorch.
+fn python_tools(root: &Path) -> Result<()> {
+    prerequisites::check()?;
+    let _lock = process::lock(root)?;
+    venv::ensure(root)
 }
 
 /// Builds all nodes and the recorder, then becomes `swath launch`.
@@ -148,8 +178,19 @@ fn chaos(root: &Path, args: &[OsString]) -> Result<()> {
 }
 
 fn soak(root: &Path, args: &[OsString]) -> Result<()> {
+    if args == ["python"] {
+        python_tools(root)?;
+        return wheel::soak(root);
+    }
     setup(root, true)?;
     soak::run(root, args)
+}
+
+fn web(root: &Path, args: &[OsString]) -> Result<()> {
+    if !args.is_empty() {
+        bail!("web takes no arguments\n\n{USAGE}");
+    }
+    web::build(root)
 }
 
 fn ament(root: &Path, args: &[OsString]) -> Result<()> {

@@ -35,11 +35,13 @@ pub fn ensure(root: &Path) -> Result<()> {
     fs::write(&stamp, wanted).with_context(|| format!("cannot write {}", stamp.display()))
 }
 
-/// `*/tests/requirements.txt` and `*/*/tests/requirements.txt`, in the order of their paths.
+/// `tests/requirements.txt` in folders up to three deep, in the order of their paths.
 fn requirement_files(root: &Path) -> Result<Vec<PathBuf>> {
-    let mut folders = subfolders(root)?;
-    for folder in folders.clone() {
-        folders.extend(subfolders(&folder)?);
+    let (mut folders, mut deepest) = (Vec::new(), vec![root.to_owned()]);
+    for _ in 0..3 {
+        let inside = deepest.iter().map(|folder| subfolders(folder)).collect::<Result<Vec<_>>>()?;
+        deepest = inside.into_iter().flatten().collect();
+        folders.extend(deepest.clone());
     }
     let mut files: Vec<PathBuf> =
         folders.iter().map(|folder| folder.join("tests/requirements.txt")).filter(|file| file.is_file()).collect();

@@ -18,10 +18,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-ros", &["swath-msgs"]),
     ("swath-bags", &["swath-msgs", "swath-ros"]),
     ("swath-training", &["swath-sim"]),
+    ("swath-python", &["swath-sim", "swath-mission"]),
     ("swath-mission", &["swath-sim", "swath-msgs"]),
     ("swath-node", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission"]),
     ("swath-space", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-node"]),
     ("swath-ground", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
+    ("swath-console", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
     (
         "swath-nodes",
         &[
@@ -33,6 +35,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "swath-node",
             "swath-space",
             "swath-ground",
+            "swath-console",
             "swath-training",
         ],
     ),
@@ -46,10 +49,12 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-ros", &["tch", "torch-sys", "mcap"]),
     ("swath-bags", &["tch", "torch-sys"]),
     ("swath-training", &["ros2-client", "rustdds", "mcap"]),
+    ("swath-python", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
     ("swath-mission", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
     ("swath-node", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-ground", &["tch", "torch-sys"]),
+    ("swath-console", &["tch", "torch-sys", "parquet", "plotters"]),
     ("xtask", &["tch", "torch-sys", "ros2-client", "rustdds"]),
 ];
 

@@ -319,7 +319,9 @@ impl Tap {
             reading = ros_qos::to_ros(&changed);
         }
         let subscription = self.node.raw_subscription(name, type_name, &reading)?;
-        self.sources.push(Source::new(topic, subscription, entry)?);
+        let is_clock =
+            name == self.node.names().resolve(graph::CLOCK.entry.name)? && type_name == graph::CLOCK.entry.type_name;
+        self.sources.push(Source::new(topic, is_clock, subscription, entry)?);
         Ok(())
     }
 }

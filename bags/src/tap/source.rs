@@ -38,6 +38,7 @@ pub(super) struct Source {
 impl Source {
     pub(super) fn new(
         topic: Topic,
+        is_clock: bool,
         subscription: RawSubscription,
         entry: Option<&'static graph::Entry>,
     ) -> Result<Self> {
@@ -45,7 +46,6 @@ impl Source {
             true => StampPlace::Nowhere,
             false => StampPlace::of(&Schema::of(&topic)?),
         };
-        let is_clock = topic.name == "/clock" && topic.type_name == "rosgraph_msgs/msg/Clock";
         Ok(Self { topic, is_clock, subscription, stamp, entry, lost: 0 })
     }
 

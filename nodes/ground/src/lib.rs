@@ -5,4 +5,5 @@
 pub mod debrief;
 pub mod launch;
 pub mod operate;
+pub mod place;
 pub mod requests;

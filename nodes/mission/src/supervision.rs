@@ -117,6 +117,12 @@ impl Watch {
         Step::Nothing
     }
 
+    /// It is not started again.
+    pub fn give_up(&mut self) -> Step {
+        self.stage = Stage::GivenUp;
+        Step::GiveUp
+    }
+
     /// Losses within the window, up to the last one.
     #[must_use]
     pub fn losses(&self) -> u32 {

@@ -24,6 +24,14 @@ pub enum MessageError {
         /// Value given.
         value: u8,
     },
+    /// A tick that the mission does not have.
+    #[error("tick {tick} lies after the mission's end at tick {end}")]
+    Tick {
+        /// Tick given.
+        tick: u64,
+        /// The mission's last.
+        end: u64,
+    },
     /// Too many candidates.
     #[error("{count} candidates were offered, the limit is {max}")]
     Candidates {

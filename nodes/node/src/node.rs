@@ -13,6 +13,7 @@ use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
 
+use crate::error::MessageError;
 use crate::out;
 use crate::program::{MISSION, Program};
 use crate::stamp::Stamper;
@@ -85,7 +86,7 @@ impl MissionNode {
         Ok(Self {
             shutdown,
             horizon: mission.horizon(&model),
-            stamper: Stamper::new(mission.epoch_unix_s, model.period),
+            stamper: Stamper::new(mission.epoch_unix_s, model.period).in_namespace(node.names().namespace()),
             model,
             mission,
             diagnostics,
@@ -136,6 +137,28 @@ impl MissionNode {
         let process = Process::ALL.into_iter().find(|process| self.node.names().name() == process.name())?;
         let last = usize::try_from(self.struck.checked_sub(1)?).ok()?;
         self.mission.faults.of(process, self.model.period).get(last).map(|(it, _)| *it)
+    }
+
+    /// Waits for news, and tells whether there are any; what went wrong with the messages of others is an alarm.
+    ///
+    /// # Errors
+    /// When the node may not go on, or an alarm cannot be sent.
+    pub fn wait(&self, timeout: Duration) -> Result<bool> {
+        for notice in self.node.notices() {
+            self.alarm(Severity::Warn, notice.trouble.name(), &notice.to_string())?;
+        }
+        Ok(self.node.wait(timeout)?)
+    }
+
+    /// A tick of this mission.
+    ///
+    /// # Errors
+    /// When it lies after the mission's end.
+    pub fn tick(&self, tick: u64) -> Result<Tick, MessageError> {
+        if tick > self.horizon.0 {
+            return Err(MessageError::Tick { tick, end: self.horizon.0 });
+        }
+        Ok(Tick(tick))
     }
 
     /// Sets this node's idea of simulated time.

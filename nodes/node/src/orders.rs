@@ -3,7 +3,7 @@
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Review;
 use swath_mission::orders::action::{Act, Action};
-use swath_mission::orders::order::Order;
+use swath_mission::orders::order::{Order, Part};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
 use swath_sim::time::Tick;
@@ -35,13 +35,21 @@ pub fn order_of(message: &msg::StripRequest) -> Order {
         valid_until_ns: end(&message.valid_until),
         hold_for_approval: message.hold_for_approval,
         max_attempts: message.max_attempts,
+        part: part_of(message),
     }
+}
+
+fn part_of(message: &msg::StripRequest) -> Option<Part> {
+    let msg::StripRequest { order_ref, part, parts, share, .. } = message;
+    let alone = order_ref.is_empty() && *part == 0 && *parts == 0;
+    (!alone).then(|| Part { order_ref: order_ref.clone(), number: *part, of: *parts, share: *share })
 }
 
 /// A request as an operator submits it.
 #[must_use]
 pub fn request_message(order: &Order) -> msg::StripRequest {
     let request = &order.request;
+    let part = order.part.as_ref();
     let time = |ns: u64| if ns == 0 { Time::default() } else { swath_ros::stamp(ns) };
     msg::StripRequest {
         client_ref: order.client_ref.clone(),
@@ -58,6 +66,10 @@ pub fn request_message(order: &Order) -> msg::StripRequest {
         valid_until: time(order.valid_until_ns),
         hold_for_approval: order.hold_for_approval,
         max_attempts: order.max_attempts,
+        order_ref: part.map_or_else(String::new, |part| part.order_ref.clone()),
+        part: part.map_or(0, |part| part.number),
+        parts: part.map_or(0, |part| part.of),
+        share: part.map_or(0.0, |part| part.share),
     }
 }
 

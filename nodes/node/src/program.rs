@@ -42,6 +42,10 @@ const COMMON: &[Parameter] = &[
     Parameter { name: "orphaned_s", about: "How long it goes on without its launcher [s]; 0: there is none." },
     Parameter { name: "struck", about: "Faults ordered for this node that have befallen it already." },
     Parameter { name: "memory_limit_mb", about: "Memory that the process may have [10^6 B]; 0 without bound." },
+    Parameter {
+        name: "packet_filter",
+        about: "Whether the kernel drops datagrams that would end or fill the process.",
+    },
     Parameter { name: "use_sim_time", about: "Always true: there is no time but the simulated." },
 ];
 

@@ -2,13 +2,16 @@
 
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::std_msgs::Header;
+use swath_ros::graph;
 use swath_sim::time::{Tick, TickPeriod};
 
-/// Turns ticks into stamps.
-#[derive(Clone, Copy, Debug)]
+/// Turns ticks into stamps, and names frames.
+#[derive(Clone, Debug)]
 pub struct Stamper {
     epoch_unix_s: u32,
     period: TickPeriod,
+    /// What frames begin with.
+    prefix: String,
 }
 
 /// Name of the inertial frame N in headers.
@@ -24,7 +27,22 @@ impl Stamper {
     /// A stamper for a mission's epoch.
     #[must_use]
     pub fn new(epoch_unix_s: u32, period: TickPeriod) -> Self {
-        Self { epoch_unix_s, period }
+        Self { epoch_unix_s, period, prefix: String::new() }
+    }
+
+    /// The same for nodes in a namespace: in another than the usual one, frames have it before their names, so that
+    /// two satellites do not share one.
+    #[must_use]
+    pub fn in_namespace(self, namespace: &str) -> Self {
+        let own = namespace.trim_matches('/');
+        let shared = namespace == graph::NAMESPACE || own.is_empty();
+        Self { prefix: if shared { String::new() } else { format!("{own}/") }, ..self }
+    }
+
+    /// Full name of a frame.
+    #[must_use]
+    pub fn frame(&self, name: &str) -> String {
+        format!("{}{name}", self.prefix)
     }
 
     /// Simulated time of a tick [ns since 1970-01-01 UTC].
@@ -39,6 +57,12 @@ impl Stamper {
         swath_ros::stamp(self.nanoseconds(tick))
     }
 
+    /// Length of a number of ticks [s].
+    #[must_use]
+    pub fn seconds(&self, ticks: u32) -> f64 {
+        self.period.duration_s(ticks)
+    }
+
     /// The first tick at a time or after it; the epoch for times before it.
     #[must_use]
     pub fn tick_from(&self, time: &Time) -> Tick {
@@ -49,7 +73,7 @@ impl Stamper {
     /// Header of a message at a tick.
     #[must_use]
     pub fn header(&self, tick: Tick, frame: &str) -> Header {
-        Header { stamp: self.time(tick), frame_id: frame.to_owned() }
+        Header { stamp: self.time(tick), frame_id: self.frame(frame) }
     }
 }
 

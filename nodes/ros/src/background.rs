@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::thread::JoinHandle;
+use std::time::Instant;
 
 use futures_core::Stream as _;
 use ros2_client::Gid;
@@ -18,7 +19,7 @@ use crate::health::{ASK_EVERY, Ailment, Health};
 use crate::members::Identity;
 use crate::message::decode_as;
 use crate::minder::Minder;
-use crate::param_services::ParameterServices;
+use crate::node_services::NodeServices;
 use crate::replies::AllReplies;
 use crate::roster::Roster;
 use crate::signal::{Signal, lock};
@@ -57,7 +58,7 @@ struct Shared {
     roster: Arc<Roster>,
     minder: Arc<Minder>,
     replies: AllReplies,
-    services: Mutex<Option<ParameterServices>>,
+    services: Mutex<Option<NodeServices>>,
 }
 
 impl Background {
@@ -93,7 +94,7 @@ impl Background {
     }
 
     /// From now on the thread answers for the parameters.
-    pub(crate) fn serve(&self, mut services: ParameterServices) {
+    pub(crate) fn serve(&self, mut services: NodeServices) {
         services.set_signal(&self.shared.signal);
         *lock(&self.shared.services) = Some(services);
         self.shared.signal.raise();
@@ -119,7 +120,7 @@ impl Drop for Background {
 
 impl Shared {
     fn run(&self, mut hearing: Hearing) {
-        let mut health = Health::new();
+        let (mut health, mut dropped) = (Health::new(), Dropped::default());
         while !self.stop.load(Ordering::Relaxed) {
             self.take_events(&hearing.listener);
             self.replies.release();
@@ -138,12 +139,15 @@ impl Shared {
             {
                 tracing::warn!("parameters: {error}");
             }
+            if let Some(count) = dropped.news(|| self.dds.dropped()) {
+                self.roster.note_dropped(count);
+            }
             if let Some(ailment) = health.examine(&self.minder, &self.roster) {
                 match self.renew(ailment) {
                     Ok(listener) => hearing.listener = listener,
                     Err(fault) => self.fail(fault),
                 }
-                health = Health::after(health);
+                (health, dropped) = (Health::after(health), Dropped::default());
             }
             self.signal.wait(ASK_EVERY);
         }
@@ -209,5 +213,25 @@ impl Shared {
             Ok(identity) => self.roster.note_identity(sample.info.writer, identity),
             Err(error) => tracing::debug!("another process introduces itself wrongly: {error}"),
         }
+    }
+}
+
+/// How many datagrams were dropped when it was last looked.
+#[derive(Default)]
+struct Dropped {
+    known: u64,
+    looked: Option<Instant>,
+}
+
+impl Dropped {
+    /// How many more there are, if it is time to look.
+    fn news(&mut self, count: impl FnOnce() -> u64) -> Option<u64> {
+        if self.looked.is_some_and(|looked| looked.elapsed() < ASK_EVERY) {
+            return None;
+        }
+        self.looked = Some(Instant::now());
+        let (before, now) = (self.known, count());
+        self.known = now;
+        Some(now.saturating_sub(before)).filter(|more| *more > 0)
     }
 }

@@ -7,6 +7,7 @@ use tracing::Level;
 use yaml_serde::Value as Yaml;
 
 use crate::error::RosError;
+use crate::graph::CLOCK;
 use crate::names::Names;
 use crate::value::Value;
 
@@ -149,25 +150,36 @@ impl RosArgs {
         Ok(())
     }
 
-    /// The names of the node that the program calls `name` and puts into `namespace`.
+    /// The same, for nodes in this namespace.
+    #[must_use]
+    pub fn in_namespace(mut self, namespace: &str) -> Self {
+        self.remaps.push(Remap { node: None, from: "__ns".to_owned(), to: namespace.to_owned() });
+        self
+    }
+
+    /// The names of the node that the program calls `name` and puts into the namespace `usual`; in another one `/clock`
+    /// is that namespace's, too.
     ///
     /// # Errors
     /// [`RosError::Name`] when the name or the namespace breaks the rules of ROS.
-    pub fn names(&self, namespace: &str, name: &str) -> Result<Names, RosError> {
+    pub fn names(&self, usual: &str, name: &str) -> Result<Names, RosError> {
         let mine: Vec<&Remap> =
             self.remaps.iter().filter(|rule| rule.node.as_deref().is_none_or(|n| n == name)).collect();
         let last =
             |keys: &[&str]| mine.iter().rev().find(|rule| keys.contains(&rule.from.as_str())).map(|rule| &*rule.to);
-        let namespace = last(&["__ns"]).unwrap_or(namespace);
+        let namespace = last(&["__ns"]).unwrap_or(usual);
         let new_name = last(&["__node", "__name"]).unwrap_or(name);
-        let topics: Vec<(String, String)> = mine
-            .iter()
-            .filter(|rule| !rule.from.starts_with("__"))
-            .map(|rule| (rule.from.clone(), rule.to.clone()))
-            .collect();
         if !namespace.starts_with('/') {
             return Err(RosError::Name { name: namespace.to_owned(), reason: "a namespace starts with a slash" });
         }
+        let topics = mine.iter().filter(|rule| !rule.from.starts_with("__"));
+        let topics = topics.map(|rule| (rule.from.clone(), rule.to.clone()));
+        // In a namespace of its own a mission has a time of its own.
+        let clock = (namespace != usual).then(|| {
+            let clock = CLOCK.entry.name;
+            (clock.to_owned(), format!("{}{clock}", namespace.trim_end_matches('/')))
+        });
+        let topics: Vec<(String, String)> = topics.chain(clock).collect();
         Names::new(namespace, new_name, &topics)
     }
 

@@ -11,12 +11,15 @@ use rustdds::DomainParticipant;
 use crate::entities::{Entities, Plan};
 use crate::environment::Environment;
 use crate::error::RosError;
+use crate::screen;
 use crate::signal::lock;
 use crate::slot::{ReaderSlot, Slot, WriterSlot};
 
 /// The participant, and the endpoints made with it.
 pub(crate) struct Dds {
     environment: Environment,
+    /// Whether the kernel keeps from it what would hurt it.
+    screened: bool,
     entities: Mutex<Entities>,
     slots: Mutex<Vec<Weak<dyn Slot>>>,
 }
@@ -37,9 +40,25 @@ impl Renewed {
 }
 
 impl Dds {
-    pub(crate) fn new(environment: &Environment) -> Result<Self, RosError> {
+    pub(crate) fn new(environment: &Environment, screened: bool) -> Result<Self, RosError> {
         let entities = Mutex::new(Entities::new(environment)?);
-        Ok(Self { environment: environment.clone(), entities, slots: Mutex::default() })
+        let dds = Self { environment: environment.clone(), screened, entities, slots: Mutex::default() };
+        dds.put_up_screen();
+        Ok(dds)
+    }
+
+    fn put_up_screen(&self) {
+        if self.screened
+            && let Err(error) = screen::put_up(self.environment.domain)
+        {
+            tracing::warn!("the kernel takes no packet filter for DDS: {error}");
+        }
+    }
+
+    /// Datagrams that the kernel did not hand over so far: they would have done harm, or came faster than they were
+    /// taken.
+    pub(crate) fn dropped(&self) -> u64 {
+        if self.screened { screen::dropped(self.environment.domain) } else { 0 }
     }
 
     /// The participant of the moment.
@@ -83,6 +102,7 @@ impl Dds {
         }
         let participant = new.participant.clone();
         let former = std::mem::replace(&mut *entities, new);
+        self.put_up_screen();
         // What is broken may take its time, or panic.
         let farewell = std::thread::Builder::new().name("old DDS".to_owned()).spawn(move || drop((old, former)));
         farewell.map_err(|source| RosError::System { what: "no thread to end DDS", source })?;

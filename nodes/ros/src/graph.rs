@@ -38,6 +38,8 @@ pub const LAUNCHER: &str = "launcher";
 pub const RECORDER: &str = "recorder";
 /// Publishes the topics of a bag.
 pub const PLAYER: &str = "player";
+/// The page in a browser and the HTTP API, an operator like others.
+pub const CONSOLE: &str = "console";
 /// A person's command line or another program.
 pub const OPERATOR: &str = "operator";
 

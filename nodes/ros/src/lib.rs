@@ -33,6 +33,7 @@
 //! an asynchronous executor.
 
 mod background;
+mod bpf;
 mod cdr;
 mod cli;
 mod clock;
@@ -52,19 +53,21 @@ mod message;
 mod minder;
 mod names;
 mod node;
+mod node_services;
 mod notices;
-mod param_services;
 mod params;
 mod pulse;
 pub mod qos;
 mod replies;
 mod roster;
 mod rtps;
+mod screen;
 mod service;
 mod shutdown;
 mod signal;
 mod slot;
 mod topic;
+mod type_description;
 mod value;
 
 pub use cdr::{Cdr, HEADER_LENGTH};

@@ -1,8 +1,9 @@
-//! Log lines of `tracing` on stderr and on `/rosout`, with simulated time.
+//! Log lines of `tracing` on stderr, with simulated time, and on `/rosout`, as ROS has them.
 
 use std::fmt::{self, Write as _};
 use std::io::IsTerminal as _;
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use swath_msgs::rcl_interfaces::Log;
 use tracing::field::{Field, Visit};
@@ -12,7 +13,7 @@ use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::time::FormatTime;
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 
-use crate::clock::SimClock;
+use crate::clock::{SimClock, stamp};
 use crate::topic::Publisher;
 
 /// Sends the log lines of this process to stderr and, if there is a publisher, to `/rosout`.
@@ -24,9 +25,9 @@ pub(crate) fn install(name: String, level: Level, clock: SimClock, rosout: Optio
         // Colours are for terminals; that nobody reads the log is no reason to panic.
         .with_ansi(std::io::stderr().is_terminal())
         .log_internal_errors(false)
-        .with_timer(SimulatedTime(clock.clone()))
+        .with_timer(SimulatedTime(clock))
         .with_target(false);
-    let rosout = rosout.map(|publisher| Rosout { name, clock, publisher });
+    let rosout = rosout.map(|publisher| Rosout { name, publisher });
     let subscriber = tracing_subscriber::registry().with(LevelFilter::from_level(level)).with(stderr).with(rosout);
     // Not `try_init`, which would take in the lines of RustDDS: they are many, and sending one on
     // `/rosout` from inside of RustDDS would lock it up.
@@ -45,7 +46,6 @@ impl FormatTime for SimulatedTime {
 
 struct Rosout {
     name: String,
-    clock: SimClock,
     publisher: Arc<Publisher<Log>>,
 }
 
@@ -55,7 +55,8 @@ impl<S: Subscriber> Layer<S> for Rosout {
         event.record(&mut text);
         let metadata = event.metadata();
         let line = Log {
-            stamp: self.clock.stamp(),
+            // By the host's clock, as all of ROS stamps its log.
+            stamp: stamp(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64),
             level: severity(*metadata.level()),
             name: self.name.clone(),
             msg: text.0,

@@ -26,8 +26,8 @@ use crate::memory;
 use crate::message::encode_as;
 use crate::minder::Minder;
 use crate::names::{Names, dds_service, dds_topic, dds_type};
+use crate::node_services::NodeServices;
 use crate::notices::Notice;
-use crate::param_services::ParameterServices;
 use crate::params::{Parameters, Spec};
 use crate::pulse::{Pulse, SIGN_EVERY, Sign, say};
 use crate::qos::{Profile, QosProfile, with_depth};
@@ -93,7 +93,9 @@ impl Node {
         declare_memory(is_member, &parameters)?;
         let pulse = declare_pulse(&parameters)?;
         let epoch = identity.epoch;
-        let dds = Arc::new(Dds::new(&environment)?);
+        let screened = "Whether the kernel drops datagrams that would end DDS or fill the memory.";
+        let screened = parameters.declare(Spec::new("packet_filter", is_member, screened).read_only())?;
+        let dds = Arc::new(Dds::new(&environment, screened)?);
         let participant = dds.participant();
         let minder = Arc::new(Minder::new(&participant)?);
         let signal = Signal::new();
@@ -155,7 +157,7 @@ impl Node {
             let reason = "the nodes know no time but simulated time".to_owned();
             return Err(RosError::Parameter { name: "use_sim_time".to_owned(), reason });
         }
-        self.background.serve(self.parameter_services()?);
+        self.background.serve(self.services()?);
         Ok(())
     }
 
@@ -167,8 +169,8 @@ impl Node {
             .map_err(|error| RosError::Send { topic: IDENTITIES.to_owned(), reason: error.to_string() })
     }
 
-    fn parameter_services(&self) -> Result<ParameterServices, RosError> {
-        Ok(ParameterServices {
+    fn services(&self) -> Result<NodeServices, RosError> {
+        Ok(NodeServices {
             node: self.names.fully_qualified(),
             parameters: self.parameters.clone(),
             clock: self.clock.clone(),
@@ -178,6 +180,7 @@ impl Node {
             list: self.server(&graph::Service::new("~/list_parameters", &[], &[]))?,
             set: self.server(&graph::Service::new("~/set_parameters", &[], &[]))?,
             set_atomically: self.server(&graph::Service::new("~/set_parameters_atomically", &[], &[]))?,
+            describe_type: self.server(&graph::Service::new("~/get_type_description", &[], &[]))?,
             events: self.publisher(&graph::PARAMETER_EVENTS)?,
         })
     }

@@ -26,6 +26,8 @@ pub enum Trouble {
     Unsent,
     /// Another process has a node of this node's name.
     Namesake,
+    /// Datagrams that the kernel did not hand over.
+    Dropped,
     /// RustDDS was started anew inside this process.
     Renewed,
 }
@@ -40,6 +42,7 @@ impl Trouble {
             Self::Lagging => "reader lags",
             Self::Unsent => "messages unsent",
             Self::Namesake => "another node of this name",
+            Self::Dropped => "datagrams dropped",
             Self::Renewed => "DDS started anew",
         }
     }
@@ -80,17 +83,29 @@ struct Tally {
 impl Notices {
     /// Counts one more. Tells whether it is the first one since the last notice.
     pub(crate) fn note(&self, trouble: Trouble, topic: &str, text: impl FnOnce() -> String) -> bool {
+        self.note_several(trouble, topic, 1, text)
+    }
+
+    /// The same for several at once.
+    pub(crate) fn note_several(
+        &self,
+        trouble: Trouble,
+        topic: &str,
+        count: u64,
+        text: impl FnOnce() -> String,
+    ) -> bool {
         let mut tallies = lock(&self.tallies);
         let mut key = (trouble, topic.to_owned());
         if tallies.len() >= KINDS && !tallies.contains_key(&key) {
             key.1 = "other topics".to_owned();
         }
         let tally = tallies.entry(key).or_default();
-        tally.count += 1;
-        if tally.count == 1 {
+        let is_first = tally.count == 0;
+        tally.count += count;
+        if is_first {
             tally.text = text();
         }
-        tally.count == 1
+        is_first
     }
 
     /// What has to be told now.

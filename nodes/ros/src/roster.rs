@@ -204,6 +204,12 @@ impl Roster {
         }
     }
 
+    /// The kernel has not handed over so many datagrams.
+    pub(crate) fn note_dropped(&self, count: u64) {
+        let text = || "they would have ended DDS or filled the memory, or came faster than they were taken".to_owned();
+        self.notices.note_several(Trouble::Dropped, &self.names.fully_qualified(), count, text);
+    }
+
     /// RustDDS was started anew.
     pub(crate) fn note_renewal(&self, reason: &str) {
         self.notices.note(Trouble::Renewed, &self.names.fully_qualified(), || reason.to_owned());
@@ -321,7 +327,10 @@ impl Roster {
     /// Counts a message that does not count.
     pub(crate) fn note_stranger(&self, writer: Gid, topic: &str) {
         let text = || "their writer does not belong to the mission, they do not count".to_owned();
-        self.notices.note(Trouble::Stranger, topic, text);
+        // On topics of the whole domain others have their say.
+        if topic.starts_with(&format!("{}/", self.names.namespace().trim_end_matches('/'))) {
+            self.notices.note(Trouble::Stranger, topic, text);
+        }
         let mut state = lock(&self.state);
         let count = state.strangers.entry(writer).or_default();
         *count += 1;

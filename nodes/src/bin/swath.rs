@@ -2,12 +2,13 @@
 
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Error, Result};
 use clap::{Parser, Subcommand};
 use swath_ground::debrief::{export, refly, report};
 use swath_ground::{launch, operate};
 use swath_node::out;
 use swath_nodes::POLICIES;
+use swath_ros::RosArgs;
 
 /// Flies and operates a super-agile Earth-observing satellite that images ground strips.
 #[derive(Parser)]
@@ -25,6 +26,8 @@ enum Command {
     Strips(operate::StripsArgs),
     /// Say what the planner may do by itself, and decide on what it proposes.
     Planner(operate::PlannerArgs),
+    /// Show a flying or a recorded mission as a page in a browser.
+    Console(swath_console::ConsoleArgs),
     /// Fly a recorded mission again, with the same or another planner, and compare.
     Refly(refly::ReflyArgs),
     /// Tell of a recorded mission in one page: map, timeline, plots, decisions.
@@ -36,17 +39,19 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    run(Args::parse().command).unwrap_or_else(|error| {
+    let outcome = RosArgs::split(std::env::args()).map_err(Error::from);
+    outcome.and_then(|(words, ros)| run(Args::parse_from(words).command, &ros)).unwrap_or_else(|error| {
         out::say(format_args!("error: {}", out::chain(&error)));
         ExitCode::FAILURE
     })
 }
 
-fn run(command: Command) -> Result<ExitCode> {
+fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
     match command {
-        Command::Launch(args) => return launch::run(&args, &POLICIES),
-        Command::Strips(args) => operate::run_strips(&args)?,
-        Command::Planner(args) => operate::run_planner(&args)?,
+        Command::Launch(args) => return launch::run(&args, ros, &POLICIES),
+        Command::Strips(args) => operate::run_strips(&args, ros)?,
+        Command::Planner(args) => operate::run_planner(&args, ros)?,
+        Command::Console(args) => swath_console::run(&args, ros)?,
         Command::Refly(args) => return args.run(&POLICIES),
         Command::Report(args) => return args.run(),
         Command::Export(args) => return args.run(),

@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 use serde_json::Value;
 use swath_bags::cli::{MANIFEST, MANIFEST_TEXT};
 use swath_bags::{Bag, BagOptions, BagWriter, Filter};
-use swath_ground::debrief::recorded::{NAMESPACE, Recorded};
+use swath_ground::debrief::recorded::Recorded;
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Act;
 use swath_mission::orders::action::Review;
@@ -98,7 +98,7 @@ fn the_same_planner_flies_the_recorded_mission_again_byte_by_byte() {
     let folder = tempfile::tempdir().unwrap();
     let tasks = folder.path().join("tasks.jsonl");
     let said = common::succeed(&mut swath(&["refly", text(&sample()), "--tasks", text(&tasks)]));
-    let recorded = Recorded::open(&sample(), NAMESPACE).unwrap();
+    let recorded = Recorded::open(&sample(), None).unwrap();
     assert!(recorded.complete && recorded.tasks.len() > 10);
     assert!(said.contains(&format!("all {} tasks are the same, byte by byte", recorded.tasks.len())), "{said}");
     let lines: Vec<String> = recorded.tasks.iter().map(|(_, line)| serde_json::to_string(line).unwrap()).collect();
@@ -204,7 +204,7 @@ fn what_operators_did_in_flight_is_flown_again() {
     operate(&["strips", "replace", "160", text(&requests.join("replacement.geojson"))], 0..0);
     assert!(launch.wait().unwrap().success());
     let bag = out.join("bag");
-    let (actions, operators) = Recorded::open(&bag, NAMESPACE).unwrap().actions().unwrap();
+    let (actions, operators) = Recorded::open(&bag, None).unwrap().actions().unwrap();
     let late = actions.iter().filter(|action| !action.initial).count();
     assert!(late > 10 && late < actions.len(), "{late} of {}", actions.len());
     for (what, found) in [
@@ -227,7 +227,7 @@ fn exports_are_read_by_others() {
     common::succeed(&mut swath(&["export", text(&sample()), "-o", text(&out), "--step", "10"]));
     let read = common::succeed(&mut common::python("read_export.py", text(&out)));
     let read: Value = serde_json::from_str(&read).unwrap();
-    let recorded = Recorded::open(&sample(), NAMESPACE).unwrap();
+    let recorded = Recorded::open(&sample(), None).unwrap();
     let imaged = recorded.imaged().len() as u64;
     assert_eq!(read["tasks"].as_u64().unwrap(), recorded.tasks.len() as u64, "{read}");
     assert_eq!(read["imaged"].as_u64().unwrap(), imaged);
@@ -305,7 +305,7 @@ fn the_report_shows_what_was_flown() {
     let found = dom.split("<pre id=\"found\">").nth(1).unwrap().split("</pre>").next().unwrap();
     let found: Value = serde_json::from_str(&found.replace("&gt;", ">").replace("&amp;", "&")).unwrap();
 
-    let recorded = Recorded::open(&sample(), NAMESPACE).unwrap();
+    let recorded = Recorded::open(&sample(), None).unwrap();
     let count = |figure: &str, colour: &str| found[figure]["colours"][colour].as_u64().unwrap_or(0);
     let imaged = recorded.imaged().len() as u64;
     let (green, red, amber, blue) = ("#2CA02C", "#D62728", "#FFBB58", "#1F77B4");

@@ -15,3 +15,4 @@ mod pins;
 mod readme;
 mod recorded;
 mod supervised;
+mod two_satellites;

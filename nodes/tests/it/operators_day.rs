@@ -65,6 +65,15 @@ fn an_operators_day() {
     });
     assert!(rivers.contains("accepted") && rivers.contains(" 0 refused"), "{rivers}");
 
+    let relief = "strips submit examples/requests/flood.geojson examples/requests/river.gpx --submitter relief";
+    note(relief);
+    // What this orbit does not see is refused, and told.
+    let submitted = common::run(&mut day.command(relief));
+    assert!(String::from_utf8(submitted.stdout).unwrap().contains("an area of 20518 km²"));
+    note("strips orders --submitter relief");
+    let orders = day.json("strips orders --submitter relief");
+    assert!(orders.iter().all(|it| it["imaged"] == 0.0 && it["strips"].as_u64().unwrap() > 8), "{orders:?}");
+
     note("strips preview examples/requests/fires.geojson --hours 12");
     let preview = day.swath("strips preview examples/requests/fires.geojson --hours 12");
     assert!(preview.contains("window opens"), "{preview}");
@@ -154,6 +163,16 @@ fn an_operators_day() {
     let features = geojson["features"].as_array().unwrap();
     assert!(features.iter().any(|it| it["properties"]["state"] == "cancelled by user"));
     assert!(features.iter().all(|it| !it["properties"]["history"].as_array().unwrap().is_empty()));
+    note("launch examples/missions/disasters.toml");
+    let disasters = folder.path().join("disasters");
+    common::succeed(day.command("launch examples/missions/disasters.toml").arg("--out").arg(&disasters));
+    note("strips orders --store out/disasters-109-1/requests.sqlite");
+    let orders = day.json(&format!("strips orders --store {}", disasters.join("requests.sqlite").display()));
+    let shares: Vec<_> =
+        orders.iter().map(|it| (it["strips"].as_u64().unwrap(), it["imaged"].as_f64().unwrap())).collect();
+    assert_eq!(shares.iter().map(|it| it.0).collect::<Vec<_>>(), [12, 9, 8], "flood, river, fire: {orders:?}");
+    assert!(shares.iter().all(|(_, imaged)| *imaged > 0.999), "{orders:?}");
+
     let words = |words: &str| words.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>();
     let (shown, flown): (Vec<_>, Vec<_>) =
         (documented.iter().map(|it| words(it)).collect(), done.iter().map(|it| words(it)).collect());

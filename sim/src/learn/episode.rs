@@ -138,6 +138,14 @@ impl Mission<EpisodeRequests> {
         Self::with_requests(model, &initial, horizon, &requests, to_come)
     }
 
+    /// The episode of a seed with requests of one's own, all known at its start; `orbits` is its length.
+    #[must_use]
+    pub fn with_strips(model: Arc<Model>, orbits: f64, requests: &[StripRequest], seed: u64) -> Self {
+        let initial = InitialState::draw(&model.config, &mut rng::stream(seed, rng::INITIAL_STATE));
+        let horizon = horizon(&model, orbits);
+        Self::with_requests(model, &initial, horizon, requests, Vec::new())
+    }
+
     /// From now on the satellite differs from its model; `seed` is that of the sensors' noise.
     ///
     /// # Errors

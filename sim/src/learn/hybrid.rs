@@ -11,6 +11,7 @@ use crate::learn::observation::ObservationSet;
 use crate::mission::horizon;
 use crate::model::Model;
 use crate::planner::{Decision, Planner, PlannerError};
+use crate::task::FailureReason;
 
 /// How long to wait when no strip is left to choose from [s].
 const WAIT_S: f64 = 60.0;
@@ -70,6 +71,8 @@ pub struct Outcome {
     pub duration_s: f64,
     /// Whether the attempt succeeded.
     pub success: bool,
+    /// Why it did not.
+    pub failure: Option<FailureReason>,
     /// How the episode stands.
     pub progress: Progress,
 }
@@ -168,11 +171,19 @@ impl Episode {
     /// # Errors
     /// An episode none of whose strips can be reached.
     pub fn begin(&mut self, seed: u64) -> Result<(), LearnError> {
-        self.env = Some(Env::episode(self.model.clone(), &self.config, seed));
+        let env = Env::episode(self.model.clone(), &self.config, seed);
+        self.begin_in(env, seed, self.config.scenario.count_of(seed))
+    }
+
+    /// Begins an episode in a simulation made for it, in which `asked` strips were asked for.
+    ///
+    /// # Errors
+    /// An episode none of whose strips can be reached.
+    pub fn begin_in(&mut self, env: Env, seed: u64, asked: usize) -> Result<(), LearnError> {
+        self.env = Some(env);
         self.teacher = None;
         let (_, found) = self.wait_for_candidates()?;
         if !found {
-            let asked = self.config.scenario.count_of(seed);
             return Err(LearnError::NoStrip { seed, asked, orbits: self.config.orbits });
         }
         Ok(())
@@ -212,20 +223,22 @@ impl Episode {
         Ok(())
     }
 
-    /// Flies an action to its end, and on to where there is a strip to choose. An episode that has none left is over.
+    /// Flies an action to its end, and on to where there is a strip to choose. An episode that has none left is over, and
+    /// so is one whose satellite failed: an empty battery, a wheel that turns too fast.
     ///
     /// # Errors
     /// A token without a strip; before [`Episode::begin`].
     pub fn step(&mut self, action: Action) -> Result<Outcome, LearnError> {
         let decision = decision(&self.model, action);
         let step = self.env.as_mut().ok_or(LearnError::NoEpisode)?.step(decision)?;
-        let (waited, found) = self.wait_for_candidates()?;
+        let (waited, found) = if step.terminated { (0, false) } else { self.wait_for_candidates()? };
         let taught_s = self.teacher.as_mut().map_or(0.0, |teacher| std::mem::take(&mut teacher.waited_s));
         let period = self.model.period;
         Ok(Outcome {
             reward: step.reward,
             duration_s: period.duration_s(step.record.ticks()) + (period.duration_s(waited) + taught_s),
             success: step.record.success(),
+            failure: step.record.outcome.failure,
             progress: match (found, step.truncated) {
                 (false, _) => Progress::Terminated,
                 (true, true) => Progress::Truncated,

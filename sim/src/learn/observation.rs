@@ -10,18 +10,18 @@ use crate::world::frames::{earth_to_inertial, hill_dcm, reference_dcm};
 use crate::world::turn::Turn;
 
 /// Scale of the attitude error rate [rad/s].
-const RATE_SCALE: f64 = 0.05;
+pub const RATE_SCALE: f64 = 0.05;
 /// Scale of times relative to now [s].
-const WINDOW_SCALE_S: f64 = 300.0;
+pub const WINDOW_SCALE_S: f64 = 300.0;
 /// Scale of the wheels' momentum [N m s]: that of a wheel at 1500 rpm.
-const MOMENTUM_SCALE: f64 = 12.5;
+pub const MOMENTUM_SCALE: f64 = 12.5;
 
 /// Scale of shadows and contacts relative to now [s].
-const ORBIT_SCALE_S: f64 = 3000.0;
+pub const ORBIT_SCALE_S: f64 = 3000.0;
 /// Length of each of four bins of the priorities that come [s].
 const DENSITY_BIN_S: f64 = 180.0;
 /// Scale of the priorities of a bin.
-const DENSITY_SCALE: f64 = 10.0;
+pub const DENSITY_SCALE: f64 = 10.0;
 /// Number of features of power and data.
 const RESOURCES: usize = 16;
 

@@ -4,6 +4,7 @@
 
 mod regress_faults;
 mod regress_ground;
+mod regress_learners;
 mod regress_missions;
 mod regress_plant_errors;
 mod regress_resources;

@@ -4,15 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use swath_sim::foresight::GroundSettings;
-use swath_sim::vehicle::errors::PlantErrors;
-use swath_training::evaluate::{Mission, Spread, spread, spread_of};
-use swath_training::ground::{Bracket, brackets};
+use swath_training::ground::brackets;
 
-use super::missions::{MissionArgs, PlantArgs, cell, percent, pooled_success, strips};
+use super::campaign::{Campaign, Part};
+use super::missions::{MissionArgs, PlantArgs};
 use super::output::{JsonTarget, missions_bar, print};
+use super::plans::Plans;
 
 /// Options of `swath-train ground-plan`.
 #[derive(Debug, Args)]
@@ -50,66 +49,18 @@ pub fn ground_plan(args: &GroundPlanArgs) -> Result<()> {
     let settings =
         GroundSettings { width: args.width as usize, branches: args.branches as usize, weakness: args.weakness };
     let missions = args.missions.missions()?;
-    let bar = missions_bar(args.missions.episodes)?;
-    let found = brackets(&missions, &errors, &settings, || bar.inc(1))?;
+    let bar = missions_bar(missions.own())?;
+    let brackets = brackets(&missions, &errors, &settings, || bar.inc(1))?;
     bar.finish_and_clear();
-    let of = |quantity: fn(&Bracket) -> f64| spread_of(&found.iter().map(quantity).collect::<Vec<f64>>());
-    let (known, bound) = (of(|it| it.best_known), of(|it| it.upper_bound));
-    let flown: Vec<Flown> = plants
-        .iter()
-        .enumerate()
-        .map(|(number, (name, errors))| {
-            let missions: Vec<Mission> = found.iter().map(|it| it.flown[number]).collect();
-            let reward_per_orbit = spread(&missions, |it| Some(it.reward_per_orbit));
-            Flown { plant: name, errors, reward_per_orbit, success_rate: pooled_success(&missions), missions }
-        })
-        .collect();
+    let (width, branches, weakness) = (args.width, args.branches, args.weakness);
+    let found = Plans { width, branches, weakness, plants, brackets };
+    let mut head = args.missions.describe(&missions);
+    head["policies"] = json!([]);
+    if let Some(shard) = args.missions.shard {
+        return Part::new(shard, head, Campaign::GroundPlan(found)).write(&json);
+    }
     if json.leaves_stdout() {
-        print(&table(bound, known, &flown))?;
+        print(&found.table())?;
     }
-    let each: Vec<Value> = found
-        .iter()
-        .map(|it| json!({ "seed": it.seed, "best_known": it.best_known, "upper_bound": it.upper_bound, "ticks": it.ticks }))
-        .collect();
-    let mut whole = args.missions.describe(&missions);
-    for (key, value) in [
-        ("policies", json!([])),
-        ("width", json!(args.width)),
-        ("branches", json!(args.branches)),
-        ("weakness", json!(args.weakness)),
-        ("best_known", json!(known)),
-        ("upper_bound", json!(bound)),
-        ("brackets", json!(each)),
-        ("flown_blindly", json!(flown)),
-    ] {
-        whole[key] = value;
-    }
-    json.write(&whole)
-}
-
-/// The plans as they were flown on one plant.
-#[derive(Serialize)]
-struct Flown<'a> {
-    plant: &'a str,
-    errors: &'a PlantErrors,
-    reward_per_orbit: Option<Spread>,
-    success_rate: Option<f64>,
-    missions: Vec<Mission>,
-}
-
-fn table(bound: Option<Spread>, known: Option<Spread>, flown: &[Flown]) -> String {
-    let rewards = |name: &str, reward: Option<Spread>| {
-        let (mean, confidence) = (reward.map(|it| it.mean), reward.and_then(|it| it.confidence_95));
-        format!("{name:<34} {:>12} {:>8}", cell(mean, 3), cell(confidence, 3))
-    };
-    let mut table = format!(
-        "                                   reward/orbit   ± 95 %\n{}\n{}\n\n\
-         plan flown blindly                 reward/orbit   ± 95 %  success\n",
-        rewards("no plan exceeds", bound),
-        rewards("best plan found", known),
-    );
-    for it in flown {
-        table += &format!("{} {:>8}\n", rewards(it.plant, it.reward_per_orbit), percent(it.success_rate));
-    }
-    table + &flown.first().map_or_else(String::new, |it| strips(&it.missions))
+    json.write(&found.whole(head))
 }

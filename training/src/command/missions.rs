@@ -9,7 +9,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::EpisodeConfig;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::vehicle::errors::PlantErrors;
-use swath_training::evaluate::{Mission, Missions, spread};
+use swath_training::evaluate::{Mission, Missions, Shard, spread};
 use swath_training::process;
 use swath_training::program::Program;
 
@@ -35,6 +35,9 @@ pub struct MissionArgs {
     /// mission file, of which that section is taken; the defaults without
     #[arg(long, value_name = "FILE")]
     simulation: Option<PathBuf>,
+    /// Fly only this share of the missions, such as 2/8, and write a part for `swath-train merge` to --json
+    #[arg(long, value_name = "I/N", requires = "json")]
+    pub shard: Option<Shard>,
     /// Threads; results do not depend on it
     #[arg(long, default_value_t = super::cores())]
     threads: usize,
@@ -59,6 +62,7 @@ impl MissionArgs {
             plant: PlantErrors::default(),
             first_seed: self.seed,
             count: self.episodes,
+            shard: self.shard,
         };
         missions.seeds()?;
         Ok(missions)

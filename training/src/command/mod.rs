@@ -1,10 +1,13 @@
 //! The commands of `swath-train`.
 
+pub mod campaign;
+mod comparison;
 pub mod evaluate;
 pub mod figures;
 pub mod ground_plan;
 mod missions;
 mod output;
+mod plans;
 mod run_folder;
 mod session;
 pub mod train;

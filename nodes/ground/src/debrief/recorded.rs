@@ -25,9 +25,6 @@ use swath_mission::outcome::TaskLine;
 use swath_mission::task_log::TaskLog;
 use swath_node::orders::{action, request_of_strip};
 
-/// The namespace in which a mission's nodes run unless they are told otherwise.
-pub const NAMESPACE: &str = "/swath";
-
 /// Which recording, and of what.
 #[derive(Debug, Args)]
 pub struct RecordedArgs {
@@ -36,9 +33,9 @@ pub struct RecordedArgs {
     /// Mission file, for a bag without a manifest: one of `ros2 bag record`, or a converted one
     #[arg(long, value_name = "FILE")]
     pub mission: Option<PathBuf>,
-    /// Namespace of the mission's nodes
-    #[arg(long, default_value = NAMESPACE)]
-    pub namespace: String,
+    /// Namespace of the mission's nodes, such as /sat2 [default: the manifest's, or /swath]
+    #[arg(long)]
+    pub namespace: Option<String>,
 }
 
 impl RecordedArgs {
@@ -48,8 +45,8 @@ impl RecordedArgs {
     /// As [`Recorded::open`] and [`Recorded::open_of_mission`].
     pub fn open(&self) -> Result<Recorded> {
         match &self.mission {
-            Some(mission) => Recorded::open_of_mission(&self.bag, &self.namespace, mission),
-            None => Recorded::open(&self.bag, &self.namespace),
+            Some(mission) => Recorded::open_of_mission(&self.bag, self.namespace.as_deref(), mission),
+            None => Recorded::open(&self.bag, self.namespace.as_deref()),
         }
     }
 }
@@ -79,7 +76,7 @@ impl Recorded {
     ///
     /// # Errors
     /// When the bag cannot be read, or does not hold a mission recorded in this namespace.
-    pub fn open(path: &Path, namespace: &str) -> Result<Self> {
+    pub fn open(path: &Path, namespace: Option<&str>) -> Result<Self> {
         let bag = Bag::open(path)?;
         let mission = mission_of(&bag).with_context(|| format!("{} holds no mission", path.display()))?;
         Self::read(bag, namespace, mission)
@@ -89,12 +86,15 @@ impl Recorded {
     ///
     /// # Errors
     /// As [`open`](Self::open), and when the mission file cannot be used.
-    pub fn open_of_mission(path: &Path, namespace: &str, mission: &Path) -> Result<Self> {
+    pub fn open_of_mission(path: &Path, namespace: Option<&str>, mission: &Path) -> Result<Self> {
         let bag = Bag::open(path)?;
         Self::read(bag, namespace, without_files(Mission::read(mission)?))
     }
 
-    fn read(bag: Bag, namespace: &str, mission: Mission) -> Result<Self> {
+    fn read(bag: Bag, namespace: Option<&str>, mission: Mission) -> Result<Self> {
+        let manifest = bag.metadata_named(MANIFEST).cloned().unwrap_or_default();
+        let told = namespace.or_else(|| manifest.get("namespace").map(String::as_str));
+        let namespace = told.unwrap_or(graph::NAMESPACE).to_owned();
         let model = Arc::new(mission.model()?);
         let mut recorded = Self {
             bag,

@@ -78,6 +78,8 @@ struct Member {
     /// Whether it has been struck since its last sign of life.
     by_order: bool,
     lost: bool,
+    /// Whether the mission goes on without it.
+    beside: bool,
 }
 
 struct Running {
@@ -94,7 +96,24 @@ impl Fleet {
     /// Starts a program of this suite: the one beside this executable, or else the one on the PATH. The words end with
     /// those of ROS.
     pub fn start(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
-        let mut member = Member {
+        let mut member = self.member(name, program, args);
+        member.start(&self.config)?;
+        self.members.push(member);
+        Ok(())
+    }
+
+    /// As [`Self::start`], a process without which the mission goes on, and which gives no sign of life. It is started
+    /// again when it is killed.
+    pub fn start_beside(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
+        let mut member = self.member(name, program, args);
+        member.beside = true;
+        member.start(&self.config)?;
+        self.members.push(member);
+        Ok(())
+    }
+
+    fn member(&self, name: &str, program: &str, args: &[String]) -> Member {
+        Member {
             name: name.to_owned(),
             program: program_path(program),
             args: args.to_vec(),
@@ -105,10 +124,8 @@ impl Fleet {
             struck: 0,
             by_order: false,
             lost: false,
-        };
-        member.start(&self.config)?;
-        self.members.push(member);
-        Ok(())
+            beside: false,
+        }
     }
 
     /// Parameters besides those given at first, for the next starts of a node.
@@ -160,7 +177,9 @@ impl Fleet {
         let deadline = Instant::now() + timeout;
         loop {
             let member = self.members.iter().find(|member| member.name == name);
-            let running = member.and_then(|member| member.running.as_ref()).context("the process is not there")?;
+            let running = member
+                .and_then(|member| member.running.as_ref())
+                .with_context(|| format!("{name} has ended, and has said why"))?;
             match running.lines.recv_timeout(Duration::from_millis(50)) {
                 Ok(line) if Sign::parse(&line).is_none() => return Ok(line),
                 _ => {}
@@ -174,7 +193,7 @@ impl Fleet {
 
     /// Fails when a process has ended: so it is before the mission has begun.
     pub fn check(&mut self) -> Result<()> {
-        for member in &mut self.members {
+        for member in self.members.iter_mut().filter(|member| !member.beside) {
             if let Some(status) = member.ended()? {
                 bail!("{} before the mission was over", ending(&member.name, status));
             }
@@ -199,13 +218,19 @@ impl Fleet {
                 member.lost = true;
                 let how = ending(&member.name, status);
                 let by_order = member.by_order;
-                let step = member.watch.lost(now);
+                // One that ends by itself has said why, and would do so again.
+                let leaves = member.beside && status.signal().is_none();
+                let step = if leaves { member.watch.give_up() } else { member.watch.lost(now) };
                 tracing::warn!("{how}");
                 tell(match step {
                     Step::GiveUp => Happened::GivenUp { how },
                     _ => Happened::Lost { how, times: member.watch.losses(), by_order },
                 });
                 continue;
+            }
+            if member.beside {
+                member.watch.sign(now);
+                member.lost &= member.running.is_none();
             }
             match member.watch.step(now) {
                 Step::Warn => tell(Happened::Silent(Duration::from_secs_f64(self.config.warn_s))),
@@ -252,7 +277,9 @@ impl Fleet {
 impl Member {
     fn start(&mut self, config: &SupervisionConfig) -> Result<()> {
         let mut own = vec![format!("epoch:={}", self.epoch), format!("orphaned_s:={:?}", config.orphaned_s)];
-        if self.struck > 0 {
+        if self.beside {
+            own.clear();
+        } else if self.struck > 0 {
             own.push(format!("struck:={}", self.struck));
         }
         let mut child = Command::new(&self.program)

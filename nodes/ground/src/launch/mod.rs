@@ -17,6 +17,7 @@ use swath_sim::task::Totals;
 use swath_sim::time::Tick;
 
 use output::{Flown, OutputFolder};
+use over_dds::Wishes;
 use progress::Progress;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::file::Mission;
@@ -25,11 +26,15 @@ use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
+use swath_ros::RosArgs;
+
+use crate::place::Place;
 
 /// `swath launch`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  swath launch examples/missions/one_orbit.toml --out out/one\n  \
-    swath launch examples/missions/one_orbit.toml --in-process --seed 7")]
+    swath launch examples/missions/one_orbit.toml --in-process --seed 7\n  \
+    swath launch examples/missions/operators_day.toml --console")]
 pub struct LaunchArgs {
     /// Mission file (TOML).
     pub mission: PathBuf,
@@ -60,6 +65,13 @@ pub struct LaunchArgs {
     /// Print the summary as JSON instead of a table.
     #[arg(long)]
     pub json: bool,
+    /// Show the mission as a page in a browser, at this address of this machine.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080",
+        conflicts_with = "in_process")]
+    pub console: Option<std::net::SocketAddr>,
+    /// Where it flies.
+    #[command(flatten)]
+    pub place: Place,
 }
 
 impl LaunchArgs {
@@ -101,7 +113,7 @@ const SAFE_MODE: u8 = 4;
 /// # Errors
 /// When the mission is not valid, a node fails or never comes up, or an output cannot be written. What was flown until
 /// then is in the outputs; where nothing was, there are none.
-pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
+pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
     if args.in_process {
         mission.faults.fits_one_process()?;
@@ -117,7 +129,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
     let (requests, faults) = mission.initial_requests()?;
     faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
-    let flown = fly(args, &mission, &requests, &mut output, policies);
+    let flown = fly(args, &args.place.args(ros), &mission, &requests, &mut output, policies);
     let Flown { summary, failure, safe_mode } = match flown {
         Ok(flown) => flown,
         Err(error) => {
@@ -150,6 +162,7 @@ pub fn run(args: &LaunchArgs, policies: &Policies) -> Result<ExitCode> {
 /// Flies a mission; an error where nothing was flown.
 fn fly(
     args: &LaunchArgs,
+    ros: &RosArgs,
     mission: &Mission,
     requests: &[Order],
     output: &mut OutputFolder,
@@ -161,7 +174,8 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
-        over_dds::fly(&mission, &mission_file, output, !args.no_bag, policies)
+        let wishes = Wishes { record: !args.no_bag, console: args.console };
+        over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
     }
 }
 

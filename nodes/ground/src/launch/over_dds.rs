@@ -1,6 +1,7 @@
 //! A mission over DDS: four nodes and the recorder, each a process of its own.
 
 use std::collections::VecDeque;
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -26,8 +27,8 @@ use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
-/// How long the recorder may take to come up.
-const RECORDER_TIMEOUT: Duration = Duration::from_secs(20);
+/// How long the recorder and the console may take to come up.
+const START_TIMEOUT: Duration = Duration::from_secs(20);
 /// In lockstep, a mission without a decision for so long has stalled.
 const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long the last summary of the requests may take.
@@ -38,27 +39,42 @@ const WHOLE_TIMEOUT: Duration = Duration::from_secs(20);
 /// After so many losses of late another planner decides in the planner's place.
 const PLANNER_LOSSES: u32 = 3;
 
+/// What there is besides the nodes that fly.
+#[derive(Clone, Copy)]
+pub struct Wishes {
+    /// Whether a bag is recorded.
+    pub record: bool,
+    /// Where the console listens, if there is one.
+    pub console: Option<SocketAddr>,
+}
+
 /// Flies a mission over DDS; an error where nothing was flown.
 pub fn fly(
     mission: &Mission,
     mission_file: &Path,
+    ros: &RosArgs,
     output: &mut OutputFolder,
-    record: bool,
+    wishes: Wishes,
     policies: &Policies,
 ) -> Result<Flown> {
-    let mut launcher = Launcher::start(mission)?;
-    let manifest_data = manifest_data(mission, policies);
+    let mut launcher = Launcher::start(mission, ros)?;
+    let namespace = launcher.node.names().namespace().to_owned();
+    let manifest_data = manifest_data(mission, &namespace, policies);
     let mut fleet = Fleet::new(&mission.supervision);
+    let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
         let mission = text(mission_file)?;
         let words = ["record", "--use-sim-time", "--resume", "--manifest", &mission, "--output", &text(&bag)?];
         let words = words.map(str::to_owned).into_iter().chain(manifest_data);
-        let words: Vec<String> = words.chain(["--ros-args".to_owned()]).collect();
+        let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words)?;
-        fleet.wait_for_line(graph::RECORDER, RECORDER_TIMEOUT)?;
+        fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
     }
-    start_nodes(&mut fleet, mission_file, output, record)?;
+    if let Some(address) = wishes.console {
+        show(&mut fleet, &mission.name, &namespace, address)?;
+    }
+    start_nodes(&mut fleet, mission_file, &namespace, output, wishes)?;
     let nodes = fleet.processes();
     let watched = launcher.watch(&mut fleet, output);
     let Some(flown) = launcher.flown else {
@@ -98,8 +114,8 @@ pub fn fly(
 }
 
 /// What the manifest of the bag tells besides the mission.
-fn manifest_data(mission: &Mission, policies: &Policies) -> Vec<String> {
-    let mut entries = vec![format!("revision={}", policies.revision)];
+fn manifest_data(mission: &Mission, namespace: &str, policies: &Policies) -> Vec<String> {
+    let mut entries = vec![format!("revision={}", policies.revision), format!("namespace={namespace}")];
     match (policies.digest)(&mission.planner) {
         Ok(Some(digest)) => entries.push(format!("policy_hash={digest}")),
         Ok(None) => {}
@@ -109,12 +125,31 @@ fn manifest_data(mission: &Mission, policies: &Policies) -> Vec<String> {
     entries.into_iter().flat_map(|entry| ["--manifest-data".to_owned(), entry]).collect()
 }
 
-fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, record: bool) -> Result<()> {
+/// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
+fn show(fleet: &mut Fleet, title: &str, namespace: &str, address: SocketAddr) -> Result<()> {
+    let words = [
+        "console".to_owned(),
+        format!("--listen={address}"),
+        format!("--title={title}"),
+        format!("--namespace={namespace}"),
+    ];
+    fleet.start_beside(graph::CONSOLE, "swath", &words)?;
+    out::say(format_args!("console: {}", fleet.wait_for_line(graph::CONSOLE, START_TIMEOUT)?));
+    Ok(())
+}
+
+fn start_nodes(
+    fleet: &mut Fleet,
+    mission_file: &Path,
+    namespace: &str,
+    output: &OutputFolder,
+    wishes: Wishes,
+) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
     let keep = format!("keep:={}", text(&output.make_state_folder()?)?);
     let words = |extra: &[String]| {
         let own = ["--ros-args", "-p", &mission, "-p", &keep].map(str::to_owned);
-        own.into_iter().chain(extra.iter().cloned()).collect::<Vec<_>>()
+        own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
     fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
@@ -122,11 +157,19 @@ fn start_nodes(fleet: &mut Fleet, mission_file: &Path, output: &OutputFolder, re
         fleet.start(name, program, &words(&[]))?;
     }
     let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
-    if record {
+    if wishes.record {
         peers.push(graph::RECORDER);
+    }
+    if wishes.console.is_some() {
+        peers.push(graph::CONSOLE);
     }
     let wait_for = ["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
     fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for))
+}
+
+/// The words after `--ros-args` that put a node into a namespace.
+fn in_namespace(namespace: &str) -> [String; 2] {
+    ["-r".to_owned(), format!("__ns:={namespace}")]
 }
 
 fn text(path: &Path) -> Result<String> {
@@ -185,8 +228,8 @@ struct Reached {
 }
 
 impl Launcher {
-    fn start(mission: &Mission) -> Result<Self> {
-        let node = Node::start(graph::LAUNCHER, &RosArgs::default())?;
+    fn start(mission: &Mission, ros: &RosArgs) -> Result<Self> {
+        let node = Node::start(graph::LAUNCHER, ros)?;
         let model = mission.model()?;
         Ok(Self {
             shutdown: Shutdown::on_signals(node.signal())?,
@@ -232,6 +275,10 @@ impl Launcher {
                 bail!("interrupted");
             }
             while let Some(point) = self.points.take()? {
+                if point.tick > self.horizon.0 {
+                    tracing::warn!("a decision point of tick {} lies after the mission's end", point.tick);
+                    continue;
+                }
                 last_news = Instant::now();
                 let (end, began) = (Tick(point.tick), self.flown.map_or(last_news, |flown| flown.began));
                 self.flown = Some(Reached { end, began, last: last_news });
@@ -261,6 +308,9 @@ impl Launcher {
     }
 
     fn take_rest(&mut self, output: &mut OutputFolder) -> Result<()> {
+        for notice in self.node.notices() {
+            tracing::warn!("{}: {notice}", notice.trouble.name());
+        }
         while let Some(result) = self.results.take()? {
             self.log.settled(result.task, result.reward);
         }
@@ -338,7 +388,7 @@ impl Launcher {
     /// and without another one the mission ends.
     fn give_up(&mut self, fleet: &mut Fleet, node: &str, tick: Tick, reason: String) -> Result<()> {
         tracing::error!("{reason}");
-        if node == graph::RECORDER {
+        if !graph::FLIGHT_NODES.contains(&node) {
             return Ok(());
         }
         let key = Key::new(graph::LAUNCHER, "safe mode");

@@ -27,8 +27,8 @@ impl Operator {
     ///
     /// # Errors
     /// When DDS cannot be used.
-    pub fn start() -> Result<Self> {
-        Ok(Self { node: Node::start(&format!("operator_{}", std::process::id()), &RosArgs::default())? })
+    pub fn start(ros: &RosArgs) -> Result<Self> {
+        Ok(Self { node: Node::start(&format!("operator_{}", std::process::id()), ros)? })
     }
 
     /// Finds a service.

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::Value;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::graph;
+use swath_ros::{RosArgs, graph};
 use swath_sim::world::strip::StripId;
 
 use super::client::{Operator, check};
@@ -46,10 +46,10 @@ struct Everything {
 ///
 /// # Errors
 /// When the mission does not answer, the store cannot be read, or the file cannot be written.
-pub fn export(args: &ExportArgs) -> Result<()> {
+pub fn export(args: &ExportArgs, ros: &RosArgs) -> Result<()> {
     let everything = match &args.store {
         Some(path) => from_store(&Store::open_read_only(path)?)?,
-        None => from_mission()?,
+        None => from_mission(ros)?,
     };
     match &args.out {
         Some(path) => {
@@ -87,8 +87,8 @@ fn write(everything: Everything, trail: bool, mut to: impl Write) -> std::io::Re
     to.flush()
 }
 
-fn from_mission() -> Result<Everything> {
-    let operator = Operator::start()?;
+fn from_mission(ros: &RosArgs) -> Result<Everything> {
+    let operator = Operator::start(ros)?;
     let desk = operator.desk(&graph::LIST_STRIPS)?;
     let mut requests = Vec::new();
     let mut call = msg::ListStripsRequest { limit: PAGE, with_requests: true, ..Default::default() };
@@ -116,14 +116,8 @@ fn from_mission() -> Result<Everything> {
 }
 
 fn from_store(store: &Store) -> Result<Everything> {
-    let snapshot = store.snapshot()?;
+    let requests = stored(store)?;
     let stamper = store.stamper()?;
-    let stored = (1..).map(StripId).zip(snapshot.requests);
-    let requests = stored.map(|(id, stored)| {
-        let status = stored_status(&stamper, snapshot.progress.now, id, &stored);
-        (stored.request.order, status)
-    });
-    let requests = requests.collect();
     let mut trail: Vec<msg::HistoryEntry> = Vec::new();
     loop {
         let lines = store.trail(trail.last().map_or(0, |entry| entry.sequence), PAGE as usize)?;
@@ -132,4 +126,19 @@ fn from_store(store: &Store) -> Result<Everything> {
         }
         trail.extend(lines.iter().map(|line| history_entry(&stamper, line)));
     }
+}
+
+/// The orders of a store, and where they stand.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(super) fn stored(store: &Store) -> Result<Vec<(Order, msg::StripStatus)>> {
+    let snapshot = store.snapshot()?;
+    let stamper = store.stamper()?;
+    let stored = (1..).map(StripId).zip(snapshot.requests);
+    let requests = stored.map(|(id, stored)| {
+        let status = stored_status(&stamper, snapshot.progress.now, id, &stored);
+        (stored.request.order, status)
+    });
+    Ok(requests.collect())
 }

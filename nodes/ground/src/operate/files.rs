@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use swath_msgs::swath_msgs as msg;
 use swath_node::out;
-use swath_ros::graph;
+use swath_ros::{RosArgs, graph};
 use swath_sim::config::SimConfig;
 
 use super::client::Operator;
@@ -56,9 +56,9 @@ impl CuttingArgs {
     ///
     /// # Errors
     /// When an option is out of range.
-    pub fn of_any(&self) -> Result<Cutting> {
+    pub fn of_any(&self, ros: &RosArgs) -> Result<Cutting> {
         self.usual()?;
-        let operator = Operator::start()?;
+        let operator = Operator::start(ros)?;
         let limits = operator.desk_within(&graph::GET_LIMITS, DRY_PATIENCE);
         match limits.and_then(|desk| desk.call(msg::GetLimitsRequest::default())) {
             Ok(limits) => self.with(&cutting_of(&limits)),

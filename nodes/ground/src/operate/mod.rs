@@ -4,6 +4,7 @@ mod client;
 mod cover;
 mod export;
 mod files;
+mod orders;
 mod planner;
 mod query;
 mod selection;
@@ -15,12 +16,17 @@ pub use planner::{PlannerArgs, run as run_planner};
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
+use swath_ros::RosArgs;
+
+use crate::place::Place;
 
 /// `swath strips`.
 #[derive(Debug, Args)]
 pub struct StripsArgs {
     #[command(subcommand)]
     command: StripsCommand,
+    #[command(flatten)]
+    place: Place,
 }
 
 #[derive(Debug, Subcommand)]
@@ -39,11 +45,15 @@ enum StripsCommand {
     /// List strips by state, area and time.
     #[command(after_help = "Example: swath strips list --state accepted --area 35,70,-10,40")]
     List(query::ListArgs),
+    /// List orders, each a line or an area with its strips, and how much of each is imaged.
+    #[command(after_help = "Examples:\n  swath strips orders --submitter floods\n  \
+        swath strips orders --store out/one/requests.sqlite")]
+    Orders(orders::OrdersArgs),
     /// Show all that is known of a strip: chances, attempts, history.
     Show(query::ShowArgs),
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
-    /// Replace a strip by the one of a file.
+    /// Replace a strip, or a whole order, by the line or area of a file.
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),
@@ -63,20 +73,22 @@ enum StripsCommand {
 ///
 /// # Errors
 /// When a file cannot be used, the request manager does not answer, or something is refused.
-pub fn run_strips(args: &StripsArgs) -> Result<()> {
+pub fn run_strips(args: &StripsArgs, ros: &RosArgs) -> Result<()> {
+    let ros = &args.place.args(ros);
     use swath_msgs::swath_msgs::ReviewStripsRequest as Review;
     match &args.command {
-        StripsCommand::Submit(args) => submit::submit(args),
+        StripsCommand::Submit(args) => submit::submit(args, ros),
         StripsCommand::Cover(args) => cover::cover(args),
-        StripsCommand::Preview(args) => query::preview(args),
-        StripsCommand::List(args) => query::list(args),
-        StripsCommand::Show(args) => query::show(args),
-        StripsCommand::Cancel(args) => submit::cancel(args),
-        StripsCommand::Replace(args) => submit::replace(args),
-        StripsCommand::Hold(args) => submit::review(args, Review::ACTION_HOLD),
-        StripsCommand::Release(args) => submit::review(args, Review::ACTION_RELEASE),
-        StripsCommand::Reject(args) => submit::review(args, Review::ACTION_REJECT),
-        StripsCommand::Watch(args) => watch::watch(args),
-        StripsCommand::Export(args) => export::export(args),
+        StripsCommand::Preview(args) => query::preview(args, ros),
+        StripsCommand::List(args) => query::list(args, ros),
+        StripsCommand::Orders(args) => orders::orders(args, ros),
+        StripsCommand::Show(args) => query::show(args, ros),
+        StripsCommand::Cancel(args) => submit::cancel(args, ros),
+        StripsCommand::Replace(args) => submit::replace(args, ros),
+        StripsCommand::Hold(args) => submit::review(args, ros, Review::ACTION_HOLD),
+        StripsCommand::Release(args) => submit::review(args, ros, Review::ACTION_RELEASE),
+        StripsCommand::Reject(args) => submit::review(args, ros, Review::ACTION_REJECT),
+        StripsCommand::Watch(args) => watch::watch(args, ros),
+        StripsCommand::Export(args) => export::export(args, ros),
     }
 }

@@ -7,10 +7,12 @@ use clap::{Args, Subcommand, ValueEnum};
 use serde_json::json;
 use swath_msgs::swath_msgs as msg;
 use swath_node::out;
-use swath_ros::graph;
+use swath_ros::{RosArgs, graph};
 
 use super::client::Operator;
 use super::files::printable;
+use crate::place::Place;
+use crate::requests::json::{time, time_json};
 
 /// `swath planner`.
 #[derive(Debug, Args)]
@@ -18,6 +20,8 @@ use super::files::printable;
 pub struct PlannerArgs {
     #[command(subcommand)]
     command: PlannerCommand,
+    #[command(flatten)]
+    place: Place,
     /// Who acts.
     #[arg(long, global = true, default_value = "operator")]
     actor: String,
@@ -66,8 +70,8 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 ///
 /// # Errors
 /// When the planner does not answer or refuses.
-pub fn run(args: &PlannerArgs) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn run(args: &PlannerArgs, ros: &RosArgs) -> Result<()> {
+    let operator = Operator::start(&args.place.args(ros))?;
     match &args.command {
         PlannerCommand::Mode { mode } => {
             let number = match mode {
@@ -134,8 +138,11 @@ fn status_json(status: &msg::PlannerStatus) -> serde_json::Value {
         "strip": status.strip.id,
         "name": status.strip.name,
         "t_pre_ticks": status.t_pre_ticks,
+        "t_pre_s": status.t_pre_s,
         "window_close_tick": status.window_close_tick,
+        "window_close": time_json(&status.window_close),
         "deadline_tick": status.deadline_tick,
+        "deadline": time_json(&status.deadline),
         "last_outcome": status.last_outcome,
     })
 }
@@ -149,14 +156,15 @@ pub fn status_text(status: &msg::PlannerStatus) -> String {
         } else if status.deadline_tick == 0 {
             "waits for an operator".to_owned()
         } else {
-            format!("waits for an operator until tick {}", status.deadline_tick)
+            format!("waits for an operator until {}", time(&status.deadline))
         };
         text += &format!(
-            "proposal {}: strip {} {} after {} ticks of transition; {decided}\n",
+            "proposal {}: strip {} {} after {:.1} s of transition, until {}; {decided}\n",
             status.proposal,
             status.strip.id,
             printable(&status.strip.name),
-            status.t_pre_ticks
+            status.t_pre_s,
+            time(&status.window_close),
         );
     }
     if !status.last_outcome.is_empty() {

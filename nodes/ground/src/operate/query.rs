@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::graph;
+use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files};
@@ -81,9 +81,9 @@ pub struct ShowArgs {
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or a strip would be refused.
-pub fn preview(args: &PreviewArgs) -> Result<()> {
+pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
     let files = Files::read(&args.files)?;
-    let operator = Operator::start()?;
+    let operator = Operator::start(ros)?;
     let import = files.cut(&args.cutting.of_mission(&operator)?);
     let horizon_s = args.hours.map_or(0.0, |hours| hours * 3600.0);
     let mut calls: Vec<_> = import
@@ -133,8 +133,8 @@ pub fn preview(args: &PreviewArgs) -> Result<()> {
 ///
 /// # Errors
 /// When nobody answers or a filter is refused.
-pub fn list(args: &ListArgs) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let desk = operator.desk(&graph::LIST_STRIPS)?;
     let at = |ns: Option<u64>| ns.map_or_else(Time::default, swath_ros::stamp);
     let mut call = msg::ListStripsRequest {
@@ -204,8 +204,8 @@ impl Standing {
 ///
 /// # Errors
 /// When nobody answers or there is no such strip.
-pub fn show(args: &ShowArgs) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn show(args: &ShowArgs, ros: &RosArgs) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let call = msg::GetStripRequest {
         id: args.id.unwrap_or(0),
         submitter: args.submitter.clone(),

@@ -26,6 +26,9 @@ pub struct Actor {
 /// What strips have in common.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Common {
+    /// Only strips of the order with this number
+    #[arg(long)]
+    pub order: Option<u64>,
     /// Only strips of the line, area or strip with this reference of its submitter's
     #[arg(long = "ref")]
     reference: Option<String>,
@@ -54,14 +57,19 @@ pub struct Selection {
 
 impl Common {
     fn is_empty(&self) -> bool {
-        let Self { reference, submitter, name, state, area } = self;
-        reference.is_none() && submitter.is_none() && name.is_none() && state.is_empty() && area.is_none()
+        let Self { order, reference, submitter, name, state, area } = self;
+        order.is_none()
+            && reference.is_none()
+            && submitter.is_none()
+            && name.is_none()
+            && state.is_empty()
+            && area.is_none()
     }
 
-    /// Whether one reference is meant, so that its strips belong together.
+    /// Whether one order or reference is meant, so that its strips belong together.
     #[must_use]
     pub fn is_one_order(&self) -> bool {
-        self.reference.is_some()
+        self.order.is_some() || self.reference.is_some()
     }
 
     /// Whether a strip that passed state and area passes the rest.
@@ -77,6 +85,7 @@ impl Common {
     pub fn call(&self) -> msg::ListStripsRequest {
         let area = self.area.unwrap_or(Area { south_deg: 0.0, north_deg: 0.0, west_deg: 0.0, east_deg: 0.0 });
         msg::ListStripsRequest {
+            order_id: self.order.unwrap_or(0),
             states: self.state.iter().map(|state| state.number()).collect::<Vec<_>>(),
             in_area: self.area.is_some(),
             south_deg: area.south_deg,
@@ -90,6 +99,12 @@ impl Common {
 }
 
 impl Selection {
+    /// The strips of an order that are not over.
+    #[must_use]
+    pub fn of_order(order: u64) -> Self {
+        Self { ids: Vec::new(), common: Common { order: Some(order), ..Common::default() } }
+    }
+
     /// The numbers that are meant; of two directions of a strip, one.
     ///
     /// # Errors
@@ -97,35 +112,44 @@ impl Selection {
     pub fn find(&self, operator: &Operator) -> Result<Vec<u64>> {
         if self.common.is_empty() {
             if self.ids.is_empty() {
-                bail!("say which strips: by number, --ref, --submitter, --name, --state or --area");
+                bail!("say which strips: by number, --order, --ref, --submitter, --name, --state or --area");
             }
             return Ok(self.ids.clone());
         }
         if !self.ids.is_empty() {
             bail!("say which strips by number or by what they have in common, not both");
         }
-        let desk = operator.desk(&graph::LIST_STRIPS)?;
-        let mut call = self.common.call();
         let mut found = BTreeSet::new();
-        loop {
-            let page = desk.call(call.clone())?;
-            check(page.reason_code, &page.reason)?;
-            call.after_id = page.strips.last().map_or(call.after_id, |status| status.strip.id);
-            for status in page.strips.iter().filter(|status| self.common.holds(status)) {
-                // What is over is meant only by those who say so.
-                let over = State::from_number(status.state).is_none_or(State::is_final);
-                if (!over || !self.common.state.is_empty()) && !found.contains(&status.linked_to) {
-                    found.insert(status.strip.id);
-                }
-            }
-            if !page.more {
-                break;
+        for status in pages(operator, &self.common)? {
+            // What is over is meant only by those who say so.
+            let over = State::from_number(status.state).is_none_or(State::is_final);
+            if (!over || !self.common.state.is_empty()) && !found.contains(&status.linked_to) {
+                found.insert(status.strip.id);
             }
         }
         if found.is_empty() {
             bail!("no strip is meant");
         }
         Ok(found.into_iter().collect())
+    }
+}
+
+/// All strips that have something in common, by their numbers.
+///
+/// # Errors
+/// When nobody answers, or a filter is refused.
+pub fn pages(operator: &Operator, common: &Common) -> Result<Vec<msg::StripStatus>> {
+    let desk = operator.desk(&graph::LIST_STRIPS)?;
+    let mut call = common.call();
+    let mut found = Vec::new();
+    loop {
+        let page = desk.call(call.clone())?;
+        check(page.reason_code, &page.reason)?;
+        call.after_id = page.strips.last().map_or(call.after_id, |status| status.strip.id);
+        found.extend(page.strips.into_iter().filter(|status| common.holds(status)));
+        if !page.more {
+            return Ok(found);
+        }
     }
 }
 

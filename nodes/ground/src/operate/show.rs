@@ -62,8 +62,10 @@ pub fn opportunity_json(opportunity: &msg::Opportunity) -> Value {
         "window_open_tick": opportunity.window_open_tick,
         "window_close_tick": opportunity.window_close_tick,
         "t_acq_ticks": opportunity.t_acq_ticks,
+        "t_acq_s": opportunity.t_acq_s,
         "min_elevation_deg": opportunity.min_elevation.to_degrees(),
         "transition_ticks": opportunity.transition_found.then_some(opportunity.transition_ticks),
+        "transition_s": opportunity.transition_found.then_some(opportunity.transition_s),
         "conflicts": opportunity.conflicts,
         "conflict_ids": opportunity.conflict_ids.to_vec(),
     })
@@ -76,13 +78,13 @@ pub fn opportunity_table(opportunities: &[msg::Opportunity]) -> String {
         "window opens", "window closes", "elevation", "acquire", "transition"
     );
     let lines = opportunities.iter().map(|it| {
-        let transition = if it.transition_found { format!("{} ticks", it.transition_ticks) } else { "-".to_owned() };
+        let transition = if it.transition_found { format!("{:.1} s", it.transition_s) } else { "-".to_owned() };
         format!(
-            "  {:<24}  {:<24}  {:>8.1}° {:>3} ticks {:>10}  {}\n",
+            "  {:<24}  {:<24}  {:>8.1}° {:>7.1} s {:>10}  {}\n",
             time(&it.window_open),
             time(&it.window_close),
             it.min_elevation.to_degrees(),
-            it.t_acq_ticks,
+            it.t_acq_s,
             transition,
             it.conflicts,
         )
@@ -107,6 +109,8 @@ fn attempt_json(attempt: &msg::Attempt) -> Value {
         "task": attempt.task,
         "start_tick": attempt.start_tick,
         "end_tick": attempt.end_tick,
+        "start": time_json(&attempt.start),
+        "end": time_json(&attempt.end),
         "t_pre_ticks": attempt.t_pre_ticks,
         "t_acq_ticks": attempt.t_acq_ticks,
         "state": attempt_state(attempt.state),
@@ -150,9 +154,17 @@ pub fn report_text(report: &msg::StripReport) -> String {
         printable(&status.submitter),
         printable(&status.client_ref),
     );
-    for (what, id) in
-        [("linked to", status.linked_to), ("replaces", status.supersedes), ("replaced by", status.superseded_by)]
-    {
+    if status.parts > 0 {
+        let share = 100.0 * status.share;
+        text +=
+            &format!("  part {} of {} of order {}, {share:.1} % of it\n", status.part, status.parts, status.order_id);
+    }
+    for (what, id) in [
+        ("linked to", status.linked_to),
+        ("replaces", status.supersedes),
+        ("replaced by", status.superseded_by),
+        ("served by the imaging of", status.served_by),
+    ] {
         if id != 0 {
             text += &format!("  {what} strip {id}\n");
         }
@@ -162,10 +174,10 @@ pub fn report_text(report: &msg::StripReport) -> String {
     text += "attempts\n";
     for attempt in &report.attempts {
         text += &format!(
-            "  task {} ticks {} to {}: {} {}, attitude error {:.3}, elevation {:.1}°\n",
+            "  task {} from {} to {}: {} {}, attitude error {:.3}, elevation {:.1}°\n",
             attempt.task,
-            attempt.start_tick,
-            attempt.end_tick,
+            time(&attempt.start),
+            time(&attempt.end),
             attempt_state(attempt.state),
             if attempt.reason_code == 0 { String::new() } else { format!("(reason {})", attempt.reason_code) },
             attempt.max_attitude_error,
@@ -209,5 +221,29 @@ mod tests {
             assert!(text.contains("\\u{1b}[2J"), "{text:?}");
             assert!(!text.chars().any(|letter| letter.is_control() && letter != '\n'), "{text:?}");
         }
+    }
+
+    #[test]
+    fn people_are_told_seconds_and_times() {
+        let at = |sec| swath_msgs::builtin_interfaces::Time { sec, nanosec: 0 };
+        let chance =
+            msg::Opportunity { t_acq_s: 21.5, transition_found: true, transition_s: 44.0, ..Default::default() };
+        let attempt = msg::Attempt { start: at(1_700_000_000), ..Default::default() };
+        let report = msg::StripReport { opportunities: vec![chance], attempts: vec![attempt], ..Default::default() };
+        let report = report_text(&report);
+        let proposal = msg::PlannerStatus {
+            proposal: 1,
+            t_pre_s: 44.0,
+            window_close: at(1_700_000_100),
+            deadline_tick: 1,
+            deadline: at(1_700_000_060),
+            ..Default::default()
+        };
+        let proposal = status_text(&proposal);
+        for text in [&report, &proposal] {
+            assert!(!text.contains("tick") && text.contains("44.0 s") && text.contains("2023-11-14T22:1"), "{text}");
+        }
+        assert!(report.contains("21.5 s") && report.contains("from 2023-11-14T22:13:20Z to -"), "{report}");
+        assert!(proposal.contains("until 2023-11-14T22:14:20Z"), "{proposal}");
     }
 }

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::graph;
+use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files, cut_json, cut_text, write_file};
 use super::selection::{Actor, Selection};
 use super::show::print_result;
+use crate::requests::json::state_name;
 use swath_node::orders::request_message;
 use swath_node::out;
 
@@ -57,10 +58,13 @@ pub struct DecideArgs {
 /// `swath strips replace`.
 #[derive(Debug, Args)]
 pub struct ReplaceArgs {
-    /// Number of the strip.
+    /// Number of the strip, or of an order with --whole-order.
     id: u64,
-    /// File with the strip that is wanted instead.
+    /// File with the line or area that is wanted instead.
     file: PathBuf,
+    /// Replace all strips of the order of that number that are not over.
+    #[arg(long)]
+    whole_order: bool,
     #[command(flatten)]
     cutting: CuttingArgs,
     /// Who submits.
@@ -75,10 +79,10 @@ pub struct ReplaceArgs {
 ///
 /// # Errors
 /// When a file cannot be used, nobody answers, or something is refused.
-pub fn submit(args: &SubmitArgs) -> Result<()> {
+pub fn submit(args: &SubmitArgs, ros: &RosArgs) -> Result<()> {
     args.cutting.usual()?;
     let files = Files::read(&args.files)?;
-    let operator = if args.dry_run || files.shapes() == 0 { None } else { Some(Operator::start()?) };
+    let operator = if args.dry_run || files.shapes() == 0 { None } else { Some(Operator::start(ros)?) };
     let cutting = match &operator {
         Some(operator) => match args.cutting.of_mission(operator) {
             Ok(cutting) => cutting,
@@ -89,7 +93,7 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
             }
         },
         None if files.shapes() == 0 => args.cutting.usual()?,
-        None => args.cutting.of_any()?,
+        None => args.cutting.of_any(ros)?,
     };
     let mut import = files.cut(&cutting);
     for order in &mut import.orders {
@@ -109,8 +113,7 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
             check(answer.reason_code, &answer.reason)?;
             for (order, result) in batch.iter().zip(&answer.results) {
                 *if result.accepted { &mut accepted } else { &mut refused } += 1;
-                let done = if order.hold_for_approval { "held" } else { "accepted" };
-                print_result(&order.name, done, result, args.json)?;
+                print_result(&order.name, &taken(result), result, args.json)?;
             }
         }
     }
@@ -133,12 +136,18 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     }
 }
 
+/// What to call a request that was taken; one that was known before says so.
+fn taken(result: &msg::SubmitResult) -> String {
+    let state = state_name(result.state);
+    if result.known { format!("known, {state}") } else { state.to_owned() }
+}
+
 /// Takes strips back.
 ///
 /// # Errors
 /// When nobody answers or something is refused.
-pub fn cancel(args: &DecideArgs) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn cancel(args: &DecideArgs, ros: &RosArgs) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let Actor { actor, reason } = &args.actor;
     let ids = args.strips.find(&operator)?;
     let call = msg::CancelStripsRequest { ids: ids.clone(), actor: actor.clone(), reason: reason.clone() };
@@ -151,8 +160,8 @@ pub fn cancel(args: &DecideArgs) -> Result<()> {
 ///
 /// # Errors
 /// When nobody answers or something is refused.
-pub fn review(args: &DecideArgs, action: u8) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn review(args: &DecideArgs, ros: &RosArgs, action: u8) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let Actor { actor, reason } = &args.actor;
     let ids = args.strips.find(&operator)?;
     let call = msg::ReviewStripsRequest { ids: ids.clone(), action, actor: actor.clone(), reason: reason.clone() };
@@ -176,26 +185,55 @@ fn tell(args: &DecideArgs, ids: &[u64], done: &str, results: &[msg::SubmitResult
     }
 }
 
-/// Replaces a strip.
+/// Replaces a strip, or an order with all of its strips.
 ///
 /// # Errors
-/// When the file does not hold one strip, nobody answers, or the new strip is refused.
-pub fn replace(args: &ReplaceArgs) -> Result<()> {
+/// When the file does not hold one line or area, or several strips for one, when nobody answers, or something is refused.
+pub fn replace(args: &ReplaceArgs, ros: &RosArgs) -> Result<()> {
     let files = Files::read(std::slice::from_ref(&args.file))?;
     if files.shapes() != 1 {
-        bail!("{} holds {} strips: one is needed to replace one", args.file.display(), files.shapes());
+        bail!("{} holds {} lines and areas: one is needed in the place of one", args.file.display(), files.shapes());
     }
-    let operator = Operator::start()?;
-    let import = files.cut(&args.cutting.of_mission(&operator)?);
-    let [order] = &import.orders[..] else {
-        bail!("{} holds {} strips: one is needed to replace one", args.file.display(), import.orders.len());
+    let operator = Operator::start(ros)?;
+    let mut import = files.cut(&args.cutting.of_mission(&operator)?);
+    for order in &mut import.orders {
+        order.submitter.clone_from(&args.submitter);
+    }
+    if !args.whole_order && import.orders.len() != 1 {
+        bail!("{} becomes {} strips: one is needed to replace one", args.file.display(), import.orders.len());
+    }
+    let old = if args.whole_order { Selection::of_order(args.id).find(&operator)? } else { vec![args.id] };
+    let desk = operator.desk(&graph::REPLACE_STRIP)?;
+    let mut refused = import.refused.len();
+    let mut tell = |name: &str, done: &str, result: &msg::SubmitResult| {
+        refused += usize::from(!result.accepted);
+        print_result(name, done, result, args.json)
     };
-    let request = msg::StripRequest { submitter: args.submitter.clone(), ..request_message(order) };
-    let call = msg::ReplaceStripRequest { id: args.id, request };
-    let result = operator.desk(&graph::REPLACE_STRIP)?.call(call)?.result;
-    print_result(&order.name, "accepted", &result, args.json)?;
-    if !result.accepted {
-        bail!("strip {} was not replaced", args.id);
+    // Strip by strip, so that none is lost on the way: what is new comes before what is left of the old one goes.
+    for (id, order) in old.iter().zip(&import.orders) {
+        let result = desk.call(msg::ReplaceStripRequest { id: *id, request: request_message(order) })?.result;
+        tell(&order.name, &taken(&result), &result)?;
+    }
+    let (new, rest) = (import.orders.get(old.len()..), old.get(import.orders.len()..));
+    if let Some(new @ [_, ..]) = new {
+        let requests = new.iter().map(request_message).collect::<Vec<_>>();
+        let answer = operator.desk(&graph::SUBMIT_STRIPS)?.call(msg::SubmitStripsRequest { requests })?;
+        check(answer.reason_code, &answer.reason)?;
+        for (order, result) in new.iter().zip(&answer.results) {
+            tell(&order.name, &taken(result), result)?;
+        }
+    }
+    if let Some(rest @ [_, ..]) = rest {
+        let (actor, reason) = (args.submitter.clone(), "its order was replaced".to_owned());
+        let call = msg::CancelStripsRequest { ids: rest.to_vec(), actor, reason };
+        let answer = operator.desk(&graph::CANCEL_STRIPS)?.call_once(Default::default(), call)?;
+        check(answer.reason_code, &answer.reason)?;
+        for (id, result) in rest.iter().zip(&answer.results) {
+            tell(&format!("strip {id}"), "cancelled", result)?;
+        }
+    }
+    if refused > 0 {
+        bail!("{refused} strips were refused: they stay as they were");
     }
     Ok(())
 }

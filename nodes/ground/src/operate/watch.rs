@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
 use swath_node::out;
-use swath_ros::{Shutdown, graph};
+use swath_ros::{RosArgs, Shutdown, graph};
 
 use super::client::Operator;
 use super::show::{status_head, status_line};
@@ -33,8 +33,8 @@ const SHOWN: usize = 20;
 ///
 /// # Errors
 /// When DDS cannot be used.
-pub fn watch(args: &WatchArgs) -> Result<()> {
-    let operator = Operator::start()?;
+pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
+    let operator = Operator::start(ros)?;
     let shutdown = Shutdown::on_signals(operator.node.signal())?;
     let events = operator.node.subscription(&graph::STRIP_EVENTS)?;
     let summaries = operator.node.subscription(&graph::REQUEST_SUMMARY)?;

@@ -82,19 +82,25 @@ impl Desk {
             }
         }
         while let Some((id, call)) = next(&self.cancel)? {
-            let cancel =
-                |&number: &u64| logic.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
+            let cancel = |&number: &u64| {
+                let result = logic.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
+                messages::submit_result(logic, true, result)
+            };
             let (results, reason_code, reason) = each(&call.ids, cancel);
             outgoing.push(Outgoing::Cancelled(id, msg::CancelStripsResponse { results, reason_code, reason }));
         }
         while let Some((id, call)) = next(&self.replace)? {
-            let result = messages::submit_result(logic.replace(StripId(call.id), order_of(&call.request), logic.now()));
+            let before = logic.len();
+            let result = logic.replace(StripId(call.id), order_of(&call.request), logic.now());
+            let result = messages::submit_result(logic, logic.len() == before, result);
             outgoing.push(Outgoing::Replaced(id, msg::ReplaceStripResponse { result }));
         }
         while let Some((id, call)) = next(&self.review)? {
             let decide = |&number: &u64| {
-                let review = messages::review(call.action)?;
-                logic.review(StripId(number), review, &call.actor, &call.reason).map(|()| StripId(number))
+                let review = messages::review(call.action);
+                let decided =
+                    review.and_then(|review| logic.review(StripId(number), review, &call.actor, &call.reason));
+                messages::submit_result(logic, true, decided.map(|()| StripId(number)))
             };
             let (results, reason_code, reason) = each(&call.ids, decide);
             outgoing.push(Outgoing::Reviewed(id, msg::ReviewStripsResponse { results, reason_code, reason }));
@@ -125,7 +131,11 @@ impl Desk {
         {
             let taken = job.requests.by_ref().take(left);
             let (before, now) = (job.results.len(), logic.now());
-            job.results.extend(taken.map(|request| messages::submit_result(logic.submit(order_of(&request), now))));
+            job.results.extend(taken.map(|request| {
+                let before = logic.len();
+                let result = logic.submit(order_of(&request), now);
+                messages::submit_result(logic, logic.len() == before, result)
+            }));
             left -= job.results.len() - before;
             if job.requests.len() == 0
                 && let Some(Job { id, results, .. }) = self.jobs.pop_front()
@@ -242,8 +252,8 @@ fn get(
             return Ok(msg::GetStripResponse { reason_code, reason, ..Default::default() });
         }
     };
-    let mut attempts: Vec<_> = store.attempts(id)?.iter().map(messages::attempt).collect();
-    attempts.extend(messages::attempt_under_way(logic, id));
+    let mut attempts: Vec<_> = store.attempts(id)?.iter().map(|it| messages::attempt(&base.stamper, it)).collect();
+    attempts.extend(messages::attempt_under_way(&base.stamper, logic, id));
     let history = store.history(id)?;
     let report = msg::StripReport {
         status: messages::strip_status(&base.stamper, logic, id, request),
@@ -271,12 +281,9 @@ fn history(base: &MissionNode, store: &Store, call: &msg::ListHistoryRequest) ->
 }
 
 /// Does something with each entry of a call: its results, and why the call as a whole is refused.
-fn each<T>(
-    entries: &[T],
-    mut apply: impl FnMut(&T) -> Result<StripId, Refusal>,
-) -> (Vec<msg::SubmitResult>, u16, String) {
+fn each<T>(entries: &[T], apply: impl FnMut(&T) -> msg::SubmitResult) -> (Vec<msg::SubmitResult>, u16, String) {
     match check_batch(entries.len()) {
-        Ok(()) => (entries.iter().map(|entry| messages::submit_result(apply(entry))).collect(), 0, String::new()),
+        Ok(()) => (entries.iter().map(apply).collect(), 0, String::new()),
         Err(refusal) => (Vec::new(), refusal.code(), refusal.to_string()),
     }
 }

@@ -55,6 +55,8 @@ pub fn status_json(status: &msg::StripStatus) -> Value {
         "linked_to": status.linked_to,
         "supersedes": status.supersedes,
         "superseded_by": status.superseded_by,
+        "order_id": status.order_id,
+        "served_by": status.served_by,
     })
 }
 

@@ -66,7 +66,8 @@ pub fn filter(stamper: &Stamper, call: &msg::ListStripsRequest) -> Result<Filter
             if call.opportunity_until == none { Tick(u64::MAX) } else { stamper.tick_from(&call.opportunity_until) };
         Some((stamper.tick_from(&call.opportunity_from), until))
     };
-    Ok(Filter { states, area, between })
+    let order = (call.order_id != 0).then_some(StripId(call.order_id));
+    Ok(Filter { order, states, area, between })
 }
 
 fn area(call: &msg::ListStripsRequest) -> Result<Area, Refusal> {
@@ -118,7 +119,9 @@ pub fn upcoming_strips<'a>(
 pub fn strip_status(stamper: &Stamper, logic: &RequestLogic, id: StripId, request: &Request) -> msg::StripStatus {
     let listed = logic.strip(id);
     let windows = listed.map_or(&[][..], |listed| listed.windows_after(logic.now()));
-    status(stamper, id, request, windows.first(), listed.and_then(|listed| listed.linked))
+    let linked = listed.and_then(|listed| listed.linked);
+    let served_by = number(logic.served_by(id));
+    msg::StripStatus { served_by, ..status(stamper, id, request, windows.first(), linked) }
 }
 
 /// Where a request of a store stands.
@@ -137,6 +140,7 @@ fn status(
 ) -> msg::StripStatus {
     let window = window.filter(|_| !request.state.is_final());
     let standing = &request.standing;
+    let part = request.order.part.as_ref();
     msg::StripStatus {
         header: stamper.header(request.changed, EARTH_FRAME),
         strip: strip(id.0, &request.order),
@@ -156,6 +160,12 @@ fn status(
         linked_to: number(linked),
         supersedes: number(request.supersedes),
         superseded_by: number(standing.superseded_by),
+        order_id: request.order_id.0,
+        order_ref: part.map_or_else(String::new, |part| part.order_ref.clone()),
+        part: part.map_or(0, |part| part.number),
+        parts: part.map_or(0, |part| part.of),
+        share: part.map_or(1.0, |part| part.share),
+        served_by: 0,
     }
 }
 
@@ -195,14 +205,20 @@ fn number(id: Option<StripId>) -> u64 {
     id.map_or(0, |id| id.0)
 }
 
-/// What became of a request or of what was asked of it.
+/// What became of a request or of what was asked of it; `known` before it was asked.
 #[must_use]
-pub fn submit_result(result: Result<StripId, Refusal>) -> msg::SubmitResult {
+pub fn submit_result(logic: &RequestLogic, known: bool, result: Result<StripId, Refusal>) -> msg::SubmitResult {
     match result {
-        Ok(id) => msg::SubmitResult { accepted: true, id: id.0, ..msg::SubmitResult::default() },
-        Err(refusal) => {
-            msg::SubmitResult { accepted: false, id: 0, reason_code: refusal.code(), reason: refusal.to_string() }
+        Ok(id) => {
+            let state = logic.state(id).map_or(0, State::number);
+            msg::SubmitResult { accepted: true, id: id.0, known, state, ..msg::SubmitResult::default() }
         }
+        Err(refusal) => msg::SubmitResult {
+            reason_code: refusal.code(),
+            reason: refusal.to_string(),
+            state: State::Rejected.number(),
+            ..msg::SubmitResult::default()
+        },
     }
 }
 
@@ -251,9 +267,11 @@ pub fn opportunity(stamper: &Stamper, opportunity: &Opportunity) -> msg::Opportu
         window_open: stamper.time(opportunity.window.open),
         window_close: stamper.time(opportunity.window.close),
         t_acq_ticks: opportunity.t_acq,
+        t_acq_s: stamper.seconds(opportunity.t_acq),
         min_elevation: opportunity.min_elevation,
         transition_found: opportunity.transition.is_some(),
         transition_ticks: opportunity.transition.unwrap_or(0),
+        transition_s: stamper.seconds(opportunity.transition.unwrap_or(0)),
         conflicts: u32::try_from(opportunity.conflicts).unwrap_or(u32::MAX),
         conflict_ids: opportunity.conflict_ids.iter().map(|id| id.0).collect::<Vec<_>>(),
     }
@@ -261,7 +279,7 @@ pub fn opportunity(stamper: &Stamper, opportunity: &Opportunity) -> msg::Opportu
 
 /// An attempt that has ended.
 #[must_use]
-pub fn attempt(attempt: &Attempt) -> msg::Attempt {
+pub fn attempt(stamper: &Stamper, attempt: &Attempt) -> msg::Attempt {
     let (state, reason_code) = match attempt.outcome {
         Outcome::Succeeded => (msg::Attempt::STATE_SUCCEEDED, 0),
         Outcome::Cancelled => (msg::Attempt::STATE_CANCELLED, 0),
@@ -272,6 +290,8 @@ pub fn attempt(attempt: &Attempt) -> msg::Attempt {
         task: attempt.task,
         start_tick: attempt.start.0,
         end_tick: attempt.end.0,
+        start: stamper.time(attempt.start),
+        end: stamper.time(attempt.end),
         t_pre_ticks: attempt.t_pre,
         t_acq_ticks: attempt.t_acq,
         state,
@@ -284,7 +304,7 @@ pub fn attempt(attempt: &Attempt) -> msg::Attempt {
 
 /// The attempt that is under way for a strip.
 #[must_use]
-pub fn attempt_under_way(logic: &RequestLogic, id: StripId) -> Option<msg::Attempt> {
+pub fn attempt_under_way(stamper: &Stamper, logic: &RequestLogic, id: StripId) -> Option<msg::Attempt> {
     let flown = logic.progress().in_flight.filter(|flown| flown.id == id)?;
     let state = match (logic.state(id)?, logic.now() < flown.start) {
         (State::Executing, _) => msg::Attempt::STATE_ACQUIRING,
@@ -295,6 +315,7 @@ pub fn attempt_under_way(logic: &RequestLogic, id: StripId) -> Option<msg::Attem
         strip_id: id.0,
         task: flown.task,
         start_tick: flown.start.0,
+        start: stamper.time(flown.start),
         t_pre_ticks: flown.t_pre,
         t_acq_ticks: flown.t_acq,
         state,

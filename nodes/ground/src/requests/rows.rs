@@ -6,7 +6,7 @@ use swath_sim::time::Tick;
 use swath_sim::world::strip::{StripId, StripRequest};
 use swath_sim::world::windows::Window;
 
-use swath_mission::orders::order::Order;
+use swath_mission::orders::order::{Order, Part};
 use swath_mission::requests::journal::{Added, Attempt, Change, Outcome, Progress, Standing};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::reason::Reason;
@@ -43,9 +43,11 @@ pub(super) fn number(id: Option<StripId>) -> Option<i64> {
 pub(super) fn insert_request(connection: &Connection, added: &Added) -> rusqlite::Result<()> {
     let insert = "INSERT INTO requests (id, client_ref, submitter, name, start_latitude, start_longitude, end_latitude,
             end_longitude, priority, speed, bidirectional, valid_from, valid_until, hold, max_attempts, created, linked,
-            supersedes, windows, state, reason_code, reason, actor, changed)
-        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, 0, 0, '', '', 0)";
+            supersedes, windows, order_id, order_ref, part, parts, share, state, reason_code, reason, actor, changed)
+        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22,
+            ?23, ?24, 0, 0, '', '', 0)";
     let order = &added.order;
+    let part = order.part.as_ref();
     let request = &order.request;
     connection.prepare_cached(insert)?.execute(params![
         added.id.0.cast_signed(),
@@ -67,6 +69,11 @@ pub(super) fn insert_request(connection: &Connection, added: &Added) -> rusqlite
         number(added.linked),
         number(added.supersedes),
         windows_to_bytes(&added.windows),
+        added.order_id.0.cast_signed(),
+        part.map_or("", |part| &part.order_ref),
+        part.map_or(0, |part| part.number),
+        part.map_or(0, |part| part.of),
+        part.map_or(0.0, |part| part.share),
     ])?;
     Ok(())
 }
@@ -166,6 +173,7 @@ pub(super) fn read_request(row: &Row<'_>) -> rusqlite::Result<(u64, Option<Store
         valid_until_ns: row.get::<_, i64>("valid_until")?.cast_unsigned(),
         hold_for_approval: row.get("hold")?,
         max_attempts: row.get("max_attempts")?,
+        part: read_part(row)?,
     };
     let standing = Standing {
         attempts: row.get("attempts")?,
@@ -187,8 +195,17 @@ pub(super) fn read_request(row: &Row<'_>) -> rusqlite::Result<(u64, Option<Store
         changed: at("changed")?,
         standing,
         supersedes: link("supersedes")?,
+        order_id: StripId(row.get::<_, i64>("order_id")?.cast_unsigned()),
     };
     Ok((id, Some(Stored { request, windows, linked: link("linked")? })))
+}
+
+fn read_part(row: &Row<'_>) -> rusqlite::Result<Option<Part>> {
+    let (order_ref, number): (String, u32) = (row.get("order_ref")?, row.get("part")?);
+    if number == 0 {
+        return Ok(None);
+    }
+    Ok(Some(Part { order_ref, number, of: row.get("parts")?, share: row.get("share")? }))
 }
 
 pub(super) fn windows_to_bytes(windows: &[Window]) -> Vec<u8> {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use rusqlite::backup::Backup;
 use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
@@ -62,9 +63,12 @@ pub enum StoreError {
 }
 
 /// Steps from each schema to the next; the first makes an empty file schema 1.
-const MIGRATIONS: [&str; 2] = [include_str!("schema_1.sql"), include_str!("schema_2.sql")];
+const MIGRATIONS: [&str; 3] =
+    [include_str!("schema_1.sql"), include_str!("schema_2.sql"), include_str!("schema_3.sql")];
 /// How long a connection waits for another one's lock.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+/// Pages that are copied in one step.
+const PAGES_AT_ONCE: i32 = 4096;
 
 /// A connection to the store.
 pub struct Store {
@@ -140,15 +144,21 @@ impl Store {
         Ok(store)
     }
 
-    /// Opens a store that exists for reading.
+    /// Opens a store that exists for reading. One of an earlier schema stays as it is: a copy of it in memory is brought
+    /// up to date.
     ///
     /// # Errors
-    /// When the file is not there, cannot be used, or has another schema.
+    /// When the file is not there, cannot be used, or comes from a later version.
     pub fn open_read_only(path: &Path) -> Result<Self, StoreError> {
-        let store = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
-        let found = store.schema()?;
-        if found != MIGRATIONS.len() as i64 {
-            return Err(StoreError::Schema { path: path.to_owned(), found, known: MIGRATIONS.len() });
+        let mut store = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        if store.schema()? != MIGRATIONS.len() as i64 {
+            let sql = |source| StoreError::Sqlite { path: path.to_owned(), source };
+            let mut copy = Connection::open_in_memory().map_err(sql)?;
+            let backup = Backup::new(&store.connection, &mut copy).map_err(sql)?;
+            backup.run_to_completion(PAGES_AT_ONCE, Duration::ZERO, None).map_err(sql)?;
+            drop(backup);
+            store.connection = copy;
+            store.migrate()?;
         }
         Ok(store)
     }

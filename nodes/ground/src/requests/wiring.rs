@@ -157,8 +157,10 @@ impl RequestNode {
             }
         }
         while let Some(phase) = self.phases.take()? {
-            if phase.phase == msg::WheelTorque::PHASE_IMAGING {
-                self.logic.on_imaging(phase.task, Tick(phase.tick));
+            match self.base.tick(phase.tick) {
+                Ok(tick) if phase.phase == msg::WheelTorque::PHASE_IMAGING => self.logic.on_imaging(phase.task, tick),
+                Ok(_) => {}
+                Err(error) => self.base.alarm(Severity::Error, "phase refused", &error.to_string())?,
             }
         }
         while let Some(request) = self.requests.take()? {
@@ -176,7 +178,7 @@ impl RequestNode {
         self.release()?;
         self.writer.check()?;
         let wait = if self.desk.is_busy() { Duration::ZERO } else { IDLE };
-        self.base.node.wait(wait)?;
+        self.base.wait(wait)?;
         Ok(())
     }
 
@@ -185,7 +187,13 @@ impl RequestNode {
         if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task && !point.mission_over) {
             return Ok(Some(last.clone()));
         }
-        let now = Tick(point.tick);
+        let now = match self.base.tick(point.tick) {
+            Ok(now) => now,
+            Err(error) => {
+                self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?;
+                return Ok(None);
+            }
+        };
         if now < self.logic.now() && self.last.is_none() {
             let known = self.logic.now();
             bail!("store {} is of a flight that is at {known}, this one is at {now}", self.reader.path().display());

@@ -209,11 +209,14 @@ mod tests {
         inputs.iter().map(step).collect()
     }
 
+    /// What comes at which tick, and the states that follow.
+    type Case<'a> = (&'a [(u64, Input)], &'a [State]);
+
     #[test]
     fn an_alarm_goes_through_its_states() {
         use Input::{Acknowledge, Condition, Shelve, Time, Unshelve};
         use State::{Acknowledged, Normal, ReturnedUnacknowledged, Shelved, Unacknowledged};
-        let cases: [(&[(u64, Input)], &[State]); 6] = [
+        let cases: [Case; 6] = [
             (&[(1, Condition(true)), (2, Acknowledge), (3, Condition(false))], &[Unacknowledged, Acknowledged, Normal]),
             (
                 &[(1, Condition(true)), (2, Condition(false)), (3, Acknowledge)],

@@ -50,9 +50,9 @@ pub enum FaultPlanError {
     #[error("{first} and {second} contradict each other: both change {part} at the same time")]
     Contradiction {
         /// The one.
-        first: PlannedFault,
+        first: Box<PlannedFault>,
         /// The other.
-        second: PlannedFault,
+        second: Box<PlannedFault>,
         /// What both change.
         part: &'static str,
     },
@@ -258,7 +258,7 @@ fn check(plan: &[PlannedFault], now: Tick, horizon: Tick, period: TickPeriod) ->
         for (&second, other) in plan.iter().zip(&scheduled).skip(i + 1) {
             let part = fault.what.part();
             if part == second.what.part() && it.meets(other) {
-                return Err(FaultPlanError::Contradiction { first: fault, second, part });
+                return Err(FaultPlanError::Contradiction { first: Box::new(fault), second: Box::new(second), part });
             }
         }
     }

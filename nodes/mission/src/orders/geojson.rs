@@ -37,5 +37,11 @@ pub fn feature_of(order: &Order) -> serde_json::Value {
     if order.max_attempts > 0 {
         properties["max_attempts"] = order.max_attempts.into();
     }
+    if let Some(part) = &order.part {
+        properties["order_ref"] = part.order_ref.clone().into();
+        properties["part"] = part.number.into();
+        properties["parts"] = part.of.into();
+        properties["share"] = part.share.into();
+    }
     feature
 }

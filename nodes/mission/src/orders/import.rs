@@ -12,7 +12,7 @@ use super::cutting::{CutStrip, Cutting};
 use super::feature::{Feature, Part};
 use super::formats::{self, FormatError};
 use super::geojson::feature_of;
-use super::order::{MISSION, Order};
+use super::order::{MISSION, Order, Part as OrderPart};
 use crate::shapes::sphere::Place;
 use crate::time_text;
 
@@ -122,9 +122,9 @@ const NAMES: [&str; 4] = ["name", "Name", "NAME", "title"];
 /// Reads requests from a file of any format that is read, `-` for standard input: lines are followed and areas are
 /// covered by strips. What is wrong costs itself alone, and all of it is told.
 ///
-/// Properties: `name`, `client_ref`, `submitter`, `priority` (0 to 1; of a line or area that becomes several strips, each
-/// has its share), `acquisition_speed_m_s`, `bidirectional`, `valid_from` and `valid_until` (RFC 3339),
-/// `hold_for_approval`, `max_attempts`.
+/// Properties: `name`, `client_ref`, `submitter`, `priority` (0 to 1; of a feature that becomes several strips, each has
+/// its share), `acquisition_speed_m_s`, `bidirectional`, `valid_from` and `valid_until` (RFC 3339), `hold_for_approval`,
+/// `max_attempts`; of a strip that is part of an order, `order_ref`, `part`, `parts`, `share`.
 ///
 /// # Errors
 /// When the file as a whole cannot be read.
@@ -198,10 +198,7 @@ impl Template {
             None => Ok(0),
             Some(text) => time_text::parse(&text).map_err(|error| format!("`{key}`: {error}")),
         };
-        let max_attempts = feature.number("max_attempts")?.unwrap_or(0.0);
-        if max_attempts.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&max_attempts) {
-            return Err("`max_attempts` must be a whole number".to_owned());
-        }
+        let max_attempts = whole(feature, "max_attempts")?;
         let client_ref = feature.text(&["client_ref"])?;
         let request = StripRequest {
             start_latitude_deg: 0.0,
@@ -217,7 +214,8 @@ impl Template {
             valid_from_ns: time("valid_from")?,
             valid_until_ns: time("valid_until")?,
             hold_for_approval: feature.flag("hold_for_approval")?,
-            max_attempts: max_attempts as u32,
+            max_attempts,
+            part: part(feature)?,
             ..Order::new(
                 client_ref.clone().unwrap_or_default(),
                 feature.text(&NAMES)?.unwrap_or_else(|| fallback.to_owned()),
@@ -227,38 +225,87 @@ impl Template {
         Ok(Self { order, referenced: client_ref.is_some_and(|text| !text.is_empty()) })
     }
 
-    /// Orders for the strips of a line or area, `suffix` of several in its feature.
-    fn orders(&self, strips: &[CutStrip], suffix: &str) -> Vec<Order> {
-        let place = |strip: &CutStrip| StripRequest {
+    /// Orders for the strips of a feature's lines and areas: one order of several strips, or a strip that is one itself.
+    fn orders(&self, shapes: &[Shape]) -> Vec<Order> {
+        let total: f64 = shapes.iter().map(|shape| shape.worth).sum();
+        let requests: Vec<Vec<StripRequest>> = shapes
+            .iter()
+            .map(|shape| {
+                let worth = shape.worth / total;
+                shape.strips.iter().map(|strip| self.request(strip, strip.share * worth)).collect()
+            })
+            .collect();
+        let all = requests.concat();
+        let order_ref = if self.referenced { self.order.client_ref.clone() } else { self.identity(&all) };
+        let mut orders = Vec::new();
+        for (shape, requests) in shapes.iter().zip(requests) {
+            let suffix = &shape.suffix;
+            let reference = if self.referenced { format!("{order_ref}{suffix}") } else { self.identity(&requests) };
+            let count = requests.len();
+            for (k, (strip, request)) in (1..).zip(shape.strips.iter().zip(requests)) {
+                let piece = if count > 1 { format!(" {k}/{count}") } else { String::new() };
+                let (number, of) = (orders.len() as u32 + 1, all.len() as u32);
+                let share = strip.share * (shape.worth / total);
+                let part = OrderPart { order_ref: order_ref.clone(), number, of, share };
+                orders.push(Order {
+                    client_ref: format!("{reference}{piece}"),
+                    name: format!("{}{suffix}{piece}", self.order.name),
+                    request,
+                    part: if all.len() > 1 { Some(part) } else { self.order.part.clone() },
+                    ..self.order.clone()
+                });
+            }
+        }
+        orders
+    }
+
+    fn request(&self, strip: &CutStrip, share: f64) -> StripRequest {
+        StripRequest {
             start_latitude_deg: strip.start[1],
             start_longitude_deg: strip.start[0],
             end_latitude_deg: strip.end[1],
             end_longitude_deg: strip.end[0],
-            priority: self.order.request.priority * strip.share,
+            priority: self.order.request.priority * share,
             ..self.order.request.clone()
-        };
-        let requests: Vec<_> = strips.iter().map(place).collect();
-        let reference =
-            if self.referenced { format!("{}{suffix}", self.order.client_ref) } else { self.identity(&requests) };
-        let count = requests.len();
-        let orders = (1..).zip(requests).map(|(k, request)| {
-            let piece = if count > 1 { format!(" {k}/{count}") } else { String::new() };
-            let name = format!("{}{suffix}{piece}", self.order.name);
-            Order { client_ref: format!("{reference}{piece}"), name, request, ..self.order.clone() }
-        });
-        orders.collect()
+        }
     }
 
     /// A reference that is the same whenever the same is asked for, in whatever file and place.
     fn identity(&self, requests: &[StripRequest]) -> String {
         let mut hash = Sha256::new();
         for request in requests {
-            let order = Order { name: String::new(), request: request.clone(), ..self.order.clone() };
+            let order = Order { name: String::new(), request: request.clone(), part: None, ..self.order.clone() };
             hash.update(feature_of(&order).to_string());
         }
         let digits: String = hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
         format!("strip-{digits}")
     }
+}
+
+fn whole(feature: &Feature, key: &str) -> Result<u32, String> {
+    let number = feature.number(key)?.unwrap_or(0.0);
+    if number.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&number) {
+        return Err(format!("`{key}` must be a whole number"));
+    }
+    Ok(number as u32)
+}
+
+/// Which part of an order a feature is, if it says so.
+fn part(feature: &Feature) -> Result<Option<OrderPart>, String> {
+    let Some(order_ref) = feature.text(&["order_ref"])?.filter(|text| !text.is_empty()) else { return Ok(None) };
+    let share = feature.number("share")?.unwrap_or(1.0);
+    Ok(Some(OrderPart { order_ref, number: whole(feature, "part")?, of: whole(feature, "parts")?, share }))
+}
+
+/// The strips of a line, or of a feature's areas.
+struct Shape {
+    strips: Vec<CutStrip>,
+    /// What it is worth beside the others of its feature: the ground that it shows [km²].
+    worth: f64,
+    /// Its number in its feature, behind a name.
+    suffix: String,
+    /// How well it is shown, when that is worth a word.
+    shown: Option<Shown>,
 }
 
 /// Takes the lines and areas of a feature; what is wrong with a part goes to `faults` with the part's number.
@@ -273,13 +320,16 @@ fn take_feature(
         return faults.push((None, "it has no geometry".to_owned()));
     }
     let several = feature.parts.len() > 1;
+    let mut shapes = Vec::new();
     let mut areas = Vec::new();
     for (number, part) in (1..).zip(&feature.parts) {
         let numbered = several.then_some(number);
-        let suffix = numbered.map_or_else(String::new, |number| format!(" {number}"));
         match part {
-            Part::Line(line) => match take_line(line, &suffix, template, cutting, import) {
-                Ok(left_out) => faults.extend(left_out.into_iter().map(|reason| (numbered, reason))),
+            Part::Line(line) => match line_shape(line, numbered, cutting) {
+                Ok((shape, left_out)) => {
+                    shapes.push(shape);
+                    faults.extend(left_out.into_iter().map(|reason| (numbered, reason)));
+                }
                 Err(reason) => faults.push((numbered, reason)),
             },
             Part::Area(rings) => areas.push(rings),
@@ -288,48 +338,39 @@ fn take_feature(
             }
         }
     }
-    if areas.is_empty() {
-        return;
+    if !areas.is_empty() {
+        let lines = feature.parts.iter().any(|part| matches!(part, Part::Line(_)));
+        match area_shape(&areas, if lines { " area" } else { "" }, cutting) {
+            Ok(shape) => shapes.push(shape),
+            Err(reason) => faults.push((None, reason)),
+        }
     }
-    let lines = feature.parts.iter().any(|part| matches!(part, Part::Line(_)));
-    if let Err(reason) = take_area(&areas, if lines { " area" } else { "" }, template, cutting, import) {
-        faults.push((None, reason));
-    }
+    import.shapes += shapes.len();
+    import.orders.extend(template.orders(&shapes));
+    let cut = shapes.iter().filter_map(|shape| {
+        let name = format!("{}{}", template.order.name, shape.suffix);
+        Some(Cut { name, strips: shape.strips.len(), shown: shape.shown? })
+    });
+    import.cut.extend(cut);
 }
 
-fn take_line(
-    line: &[Place],
-    suffix: &str,
-    template: &Template,
-    cutting: &Cutting,
-    import: &mut Import,
-) -> Result<Vec<String>, String> {
+fn line_shape(line: &[Place], number: Option<usize>, cutting: &Cutting) -> Result<(Shape, Vec<String>), String> {
     let cut = cutting.line(line)?;
-    let orders = template.orders(&cut.strips, suffix);
-    if orders.len() > 1 || cut.farthest_km > 0.01 {
-        let shown = Shown::Line { length_km: cut.length_km, farthest_km: cut.farthest_km };
-        let name = format!("{}{suffix}", template.order.name);
-        import.cut.push(Cut { name, strips: orders.len(), shown });
-    }
-    import.shapes += 1;
-    import.orders.extend(orders);
-    Ok(cut.left_out)
+    let bent = cut.strips.len() > 1 || cut.farthest_km > 0.01;
+    let shape = Shape {
+        shown: bent.then_some(Shown::Line { length_km: cut.length_km, farthest_km: cut.farthest_km }),
+        worth: cut.length_km.max(cutting.shortest_km) * cutting.swath_km,
+        strips: cut.strips,
+        suffix: number.map_or_else(String::new, |number| format!(" {number}")),
+    };
+    Ok((shape, cut.left_out))
 }
 
-fn take_area(
-    areas: &[&Vec<Vec<Place>>],
-    suffix: &str,
-    template: &Template,
-    cutting: &Cutting,
-    import: &mut Import,
-) -> Result<(), String> {
+fn area_shape(areas: &[&Vec<Vec<Place>>], suffix: &str, cutting: &Cutting) -> Result<Shape, String> {
     let (strips, cover) = cutting.area(areas)?;
-    let shown = Shown::Area { square_km: cutting.square_km(&cover), covered: cover.covered, twice: cover.twice };
-    let orders = template.orders(&strips, suffix);
-    import.cut.push(Cut { name: format!("{}{suffix}", template.order.name), strips: orders.len(), shown });
-    import.shapes += 1;
-    import.orders.extend(orders);
-    Ok(())
+    let square_km = cutting.square_km(&cover);
+    let shown = Some(Shown::Area { square_km, covered: cover.covered, twice: cover.twice });
+    Ok(Shape { strips, worth: square_km.max(f64::MIN_POSITIVE), suffix: suffix.to_owned(), shown })
 }
 
 #[cfg(test)]
@@ -373,6 +414,28 @@ mod tests {
         assert_eq!(requests[0].submitter, MISSION);
         assert_eq!(requests[1].request.acquisition_speed_m_s, DEFAULT_SPEED_M_S);
         assert!(requests[2].name.ends_with(" 2"));
+    }
+
+    #[test]
+    fn a_feature_is_one_order_whose_strips_share_its_priority() {
+        let text = r#"{"type":"Feature","properties":{"name":"delta","client_ref":"d","priority":0.8},
+            "geometry":{"type":"GeometryCollection","geometries":[
+              {"type":"LineString","coordinates":[[0,0],[12,0]]},
+              {"type":"LineString","coordinates":[[20,0],[24,0]]},
+              {"type":"Polygon","coordinates":[[[30,0],[32,0],[32,0.3],[30,0.3],[30,0]]]}]}}"#;
+        let orders = read_text(text).unwrap();
+        let parts: Vec<_> = orders.iter().map(|order| order.part.clone().unwrap()).collect();
+        assert!(parts.len() > 6, "{parts:?}");
+        let whole = |(number, part): (u32, &OrderPart)| {
+            part.order_ref == "d" && part.number == number && part.of == parts.len() as u32
+        };
+        assert!((1..).zip(&parts).all(whole), "{parts:?}");
+        assert!((parts.iter().map(|part| part.share).sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((parts[0].share - parts[3].share).abs() < 1e-9, "strips of the same length are worth the same");
+        let priced = |(order, part): (&Order, &OrderPart)| (order.request.priority - 0.8 * part.share).abs() < 1e-15;
+        assert!(orders.iter().zip(&parts).all(priced));
+        let alone = read_text(r#"{"type":"LineString","coordinates":[[1,2],[3,4]]}"#).unwrap();
+        assert_eq!(alone[0].part, None);
     }
 
     #[test]

@@ -21,6 +21,21 @@ pub struct Order {
     pub hold_for_approval: bool,
     /// Attempts before it fails; 0 for the mission's default.
     pub max_attempts: u32,
+    /// The line or area that it is a strip of; none if it is an order of its own.
+    pub part: Option<Part>,
+}
+
+/// Which strip of a line or area it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Reference of the whole, the same for all of its strips.
+    pub order_ref: String,
+    /// Number of the strip in it, from 1.
+    pub number: u32,
+    /// How many strips it has.
+    pub of: u32,
+    /// Share of the worth of the whole [1]: the strip's priority is that of the whole times this.
+    pub share: f64,
 }
 
 /// Submitter of the strips that a mission knows from the start.
@@ -39,15 +54,16 @@ impl Order {
             valid_until_ns: 0,
             hold_for_approval: false,
             max_attempts: 0,
+            part: None,
         }
     }
 
     /// Whether it asks for the same as one that is known, of which, if it is bidirectional, the other direction may have
-    /// been kept.
+    /// been kept. What both are parts of does not matter.
     #[must_use]
     pub fn is_for_the_same_as(&self, known: &Self) -> bool {
-        self == known
-            || (self.request.bidirectional && *known == Self { request: self.request.reversed(), ..self.clone() })
+        let same = Self { part: known.part.clone(), ..self.clone() };
+        same == *known || (self.request.bidirectional && *known == Self { request: self.request.reversed(), ..same })
     }
 
     /// Simulated times between which it may be imaged [ns since 1970-01-01 UTC].

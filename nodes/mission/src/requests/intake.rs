@@ -22,6 +22,7 @@ impl RequestLogic {
         check_text("name", &order.name)?;
         check_text("client_ref", &order.client_ref)?;
         check_text("submitter", &order.submitter)?;
+        check_part(order)?;
         if order.max_attempts > ATTEMPTS_MAX {
             return Err(Refusal::Attempts { given: order.max_attempts });
         }
@@ -64,8 +65,10 @@ impl RequestLogic {
     }
 
     pub(super) fn take_in(&mut self, order: &Order, replaces: Option<StripId>, at: Tick) -> Result<StripId, Refusal> {
-        if let Some(id) = self.by_reference(&order.submitter, &order.client_ref).filter(|&id| Some(id) != replaces) {
-            return if self.request(id).is_some_and(|known| order.is_for_the_same_as(&known.order)) {
+        if let Some(id) = self.by_reference(&order.submitter, &order.client_ref).filter(|&id| Some(id) != replaces)
+            && let Some(known) = self.request(id).filter(|known| !may_be_asked_again(known.state))
+        {
+            return if order.is_for_the_same_as(&known.order) {
                 Ok(id)
             } else {
                 let client_ref = order.client_ref.chars().take(TEXT_MAX).collect();
@@ -81,6 +84,9 @@ impl RequestLogic {
         let state = state.map_err(|illegal| Refusal::State { id: 0, illegal })?;
         let first = StripId::from_index(self.len());
         let twin = (ways.len() > 1).then_some(StripId(first.0 + 1));
+        let whole = order.part.as_ref();
+        let order_id = whole.and_then(|part| self.register.order_by_reference(&order.submitter, &part.order_ref));
+        let order_id = order_id.unwrap_or(first);
         for (id, (request, prepared)) in (first.0..).map(StripId).zip(ways) {
             let order = Order { request, ..order.clone() };
             let linked = if id == first { twin } else { Some(first) };
@@ -93,6 +99,7 @@ impl RequestLogic {
                 changed: at,
                 standing: Standing::default(),
                 supersedes: replaces,
+                order_id,
             };
             self.add(id, request, prepared, linked);
         }
@@ -110,6 +117,7 @@ impl RequestLogic {
             tick: request.created,
             linked,
             supersedes: request.supersedes,
+            order_id: request.order_id,
         })));
         let held = request.state == State::Held;
         self.insert(prepared, request);
@@ -117,6 +125,7 @@ impl RequestLogic {
             self.catalogue.hold(id);
         }
         self.note(id);
+        self.share_imaging(id);
     }
 
     /// Puts a request into the catalogue and the register.
@@ -132,6 +141,7 @@ impl RequestLogic {
             let (from, until) = known.order.validity_ns();
             Some(*id) != replaces
                 && Some(*id) != twin
+                && known.order.submitter == order.submitter
                 && known.order.request.acquisition_speed_m_s == order.request.acquisition_speed_m_s
                 && ours_from < until
                 && from < ours_until
@@ -161,4 +171,21 @@ impl RequestLogic {
             refused: Some(Box::new(order)),
         }));
     }
+}
+
+/// Whether the same again is a new request: it was not imaged, and will not be.
+fn may_be_asked_again(state: State) -> bool {
+    state.is_final() && !matches!(state, State::Completed | State::FulfilledByLink)
+}
+
+fn check_part(order: &Order) -> Result<(), Refusal> {
+    let Some(part) = &order.part else { return Ok(()) };
+    check_text("order_ref", &part.order_ref)?;
+    if part.number < 1 || part.number > part.of {
+        return Err(Refusal::Call { field: "part", value: f64::from(part.number), limits: "1 to parts" });
+    }
+    if !(0.0..=1.0).contains(&part.share) {
+        return Err(Refusal::Call { field: "share", value: part.share, limits: "0 to 1" });
+    }
+    Ok(())
 }

@@ -38,6 +38,8 @@ pub struct Added {
     pub linked: Option<StripId>,
     /// The request that it replaces.
     pub supersedes: Option<StripId>,
+    /// Number of the order that it is a strip of.
+    pub order_id: StripId,
 }
 
 /// A change of a request.

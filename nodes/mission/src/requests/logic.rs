@@ -1,6 +1,8 @@
 //! The request manager without ROS and without its store: every strip ever requested, what is upcoming, what is
 //! fulfilled.
 
+use std::collections::BTreeMap;
+
 use swath_sim::mission::windows_until;
 use swath_sim::model::Model;
 use swath_sim::requests::catalogue::Entry as Listed;
@@ -84,6 +86,8 @@ pub struct RequestLogic {
     pub(super) last_settled: Option<(u64, f64)>,
     pub(super) journal: Vec<Entry>,
     pub(super) aborts: Vec<Abort>,
+    /// Requests that the imaging of someone else's request for the same strip serves.
+    pub(super) served_by: BTreeMap<StripId, StripId>,
     contradictions: Vec<Contradiction>,
 }
 
@@ -107,6 +111,7 @@ impl RequestLogic {
             last_settled: None,
             journal: Vec::new(),
             aborts: Vec::new(),
+            served_by: BTreeMap::new(),
             contradictions: Vec::new(),
         }
     }
@@ -148,6 +153,9 @@ impl RequestLogic {
                 }
                 _ => {}
             }
+        }
+        for id in (1..=self.len() as u64).map(StripId) {
+            self.share_imaging(id);
         }
         Ok(())
     }
@@ -476,6 +484,7 @@ impl RequestLogic {
         let step = self.register.step(id, to, reason, actor, self.progress.now);
         step.map_err(|illegal| Refusal::State { id: id.0, illegal })?;
         self.note(id);
+        self.share_imaging(id);
         Ok(())
     }
 

@@ -12,6 +12,7 @@ pub mod register;
 pub mod request;
 pub mod restart;
 mod settle;
+mod sharing;
 
 #[cfg(test)]
 mod tests;

@@ -19,6 +19,8 @@ use crate::orders::order::Order;
 /// Which requests are listed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
+    /// Only strips of the order of this number.
+    pub order: Option<StripId>,
     /// Only these states; empty for all.
     pub states: Vec<State>,
     /// Only strips that touch this area.
@@ -86,7 +88,10 @@ impl RequestLogic {
             Page { ids, more }
         };
         let next = StripId(after.0.saturating_add(1));
-        // The narrowest way in: a place, a time, a few states, or all.
+        // The narrowest way in: an order, a place, a time, a few states, or all.
+        if let Some(order) = filter.order {
+            return page(&mut self.register.strips_of(order).iter().copied().filter(|id| *id >= next));
+        }
         if let Some(area) = &filter.area {
             return page(&mut self.register.near(area).into_iter().filter(|id| *id >= next));
         }
@@ -108,7 +113,8 @@ impl RequestLogic {
         let in_window = |(from, until): (Tick, Tick)| {
             listed.windows_after(self.now()).iter().any(|window| window.open <= until && window.close >= from)
         };
-        (filter.states.is_empty() || filter.states.contains(&request.state))
+        filter.order.is_none_or(|order| request.order_id == order)
+            && (filter.states.is_empty() || filter.states.contains(&request.state))
             && filter.area.is_none_or(|area| area.touches(&listed.strip))
             && filter.between.is_none_or(in_window)
     }
@@ -163,7 +169,9 @@ impl RequestLogic {
         let twin = own.and_then(|own| self.strip(own)?.linked);
         let others = self.register.between(window.open, until).into_iter();
         let others = others.filter(|&id| Some(id) != own && Some(id) != twin);
-        let waits = others.filter(|&id| matches!(self.state(id), Some(State::Accepted | State::Scheduled)));
+        let waits = others.filter(|&id| {
+            self.served_by(id).is_none() && matches!(self.state(id), Some(State::Accepted | State::Scheduled))
+        });
         let waits = waits.filter_map(|id| {
             let listed = self.strip(id)?;
             let overlaps = |other: &Window| other.open <= until && other.close >= window.open;

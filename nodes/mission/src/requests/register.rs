@@ -24,6 +24,10 @@ pub struct Register {
     requests: Vec<Request>,
     by_state: BTreeMap<State, BTreeSet<StripId>>,
     by_reference: HashMap<(String, String), StripId>,
+    /// Orders of several strips by submitter and reference.
+    by_order_ref: HashMap<(String, String), StripId>,
+    /// The strips of each order.
+    by_order: BTreeMap<StripId, Vec<StripId>>,
     /// Requests that are not over, by where their strips lie.
     by_place: HashMap<Place, Vec<StripId>>,
     index: Index,
@@ -38,12 +42,23 @@ impl Register {
             let key = (request.order.submitter.clone(), request.order.client_ref.clone());
             // The first of two twins has the reference; a replacement takes it over.
             let twin = self.by_reference.get(&key).copied().is_some_and(|known| {
-                known.0 + 1 == id.0 && self.get(known).is_some_and(|known| known.supersedes == request.supersedes)
+                let wanted = &request.order.request;
+                known.0 + 1 == id.0
+                    && self.get(known).is_some_and(|known| {
+                        wanted.bidirectional
+                            && known.order.request == wanted.reversed()
+                            && known.supersedes == request.supersedes
+                    })
             });
             if !twin {
                 self.by_reference.insert(key, id);
             }
         }
+        if let Some(part) = &request.order.part {
+            let key = (request.order.submitter.clone(), part.order_ref.clone());
+            self.by_order_ref.entry(key).or_insert(request.order_id);
+        }
+        self.by_order.entry(request.order_id).or_default().push(id);
         if !request.state.is_final() {
             self.by_place.entry(place(&request.order.request)).or_default().push(id);
         }
@@ -128,6 +143,18 @@ impl Register {
     #[must_use]
     pub fn by_reference(&self, submitter: &str, client_ref: &str) -> Option<StripId> {
         self.by_reference.get(&(submitter.to_owned(), client_ref.to_owned())).copied()
+    }
+
+    /// Number of the order of several strips of a submitter under a reference.
+    #[must_use]
+    pub fn order_by_reference(&self, submitter: &str, order_ref: &str) -> Option<StripId> {
+        self.by_order_ref.get(&(submitter.to_owned(), order_ref.to_owned())).copied()
+    }
+
+    /// The strips of an order, in ascending order; none if there is no such order.
+    #[must_use]
+    pub fn strips_of(&self, order_id: StripId) -> &[StripId] {
+        self.by_order.get(&order_id).map_or(&[], Vec::as_slice)
     }
 
     /// Requests that are not over for the same strip, to about a metre.

@@ -28,6 +28,8 @@ pub struct Request {
     pub standing: Standing,
     /// The request that it replaces.
     pub supersedes: Option<StripId>,
+    /// Number of the order that it is a strip of: that of the order's first strip.
+    pub order_id: StripId,
 }
 
 /// A request as the store gives it back.

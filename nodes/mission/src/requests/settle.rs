@@ -1,6 +1,7 @@
 //! What becomes of a request when its task has ended.
 
 use swath_sim::task::{FailureReason, TaskRecord};
+use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
 use super::journal::{Attempt, Entry, Outcome};
@@ -51,11 +52,16 @@ impl RequestLogic {
     fn imaged(&mut self, id: StripId) {
         self.catch_up(id, State::Executing);
         let twin = self.catalogue.get(id).and_then(|entry| entry.linked);
+        let imaging = self.request(id).map_or(Tick(0), |request| request.standing.imaging);
+        let served = self.served_with(id, imaging);
         self.catalogue.fulfil(id);
         self.must(id, State::Completed, (Reason::None, String::new()), GUIDANCE);
         if let Some(twin) = twin.filter(|&twin| self.state(twin).is_some_and(|state| !state.is_final())) {
             let text = format!("request {} was imaged", id.0);
             self.must(twin, State::FulfilledByLink, (Reason::None, text), SYSTEM);
+        }
+        for other in served {
+            self.served(other, id);
         }
     }
 

@@ -18,7 +18,7 @@ use super::query::Filter;
 use super::reason::Reason;
 use super::refusal::Refusal;
 use crate::orders::action::Review;
-use crate::orders::order::Order;
+use crate::orders::order::{Order, Part};
 
 const EPOCH_NS: u64 = 1_767_225_600_000_000_000;
 
@@ -68,6 +68,14 @@ fn record(task: u64, id: StripId, failure: Option<FailureReason>) -> TaskRecord 
     TaskRecord { task, start, end, strip: Some(id), t_pre: 100, t_acq: 200, outcome }
 }
 
+/// Imaged at the opening of its first window.
+fn imaged(logic: &RequestLogic, task: u64, id: StripId) -> TaskRecord {
+    let opens = logic.strip(id).unwrap().windows[0].open;
+    let flown = record(task, id, None);
+    let start = Tick(opens.0 - u64::from(flown.t_pre));
+    TaskRecord { start, end: opens.after(flown.t_acq), ..flown }
+}
+
 /// Chooses, images and reports a strip.
 fn fly(logic: &mut RequestLogic, task: u64, id: StripId, failure: Option<FailureReason>) {
     logic.on_task(chosen(task, id));
@@ -107,6 +115,102 @@ fn the_same_strip_is_found_although_it_has_another_name() {
     submit(&mut logic, evening).unwrap();
     logic.cancel(id, "ops", "").unwrap();
     submit(&mut logic, equatorial("again", 10.0)).unwrap();
+}
+
+#[test]
+fn what_was_not_imaged_may_be_asked_for_again_and_what_was_is_known() {
+    let mut logic = logic();
+    let first = submit(&mut logic, equatorial("a", 10.0)).unwrap();
+    logic.cancel(first, "ops", "").unwrap();
+    let second = submit(&mut logic, equatorial("a", 10.0)).unwrap();
+    assert_eq!((second, logic.state(second)), (StripId(2), Some(State::Accepted)));
+    assert_eq!(logic.by_reference("mission", "a"), Some(second));
+    fly(&mut logic, 0, second, None);
+    assert_eq!(submit(&mut logic, equatorial("a", 10.0)), Ok(second), "it was imaged");
+    assert_eq!((logic.len(), logic.count(State::Completed)), (2, 1));
+}
+
+fn of_other(submitter: &str, priority: f64) -> Order {
+    let mut order = Order { submitter: submitter.to_owned(), ..both_ways("x", 10.0) };
+    order.request.priority = priority;
+    order
+}
+
+#[test]
+fn one_imaging_serves_all_who_ask_for_the_same_strip() {
+    let mut logic = logic();
+    let a = submit(&mut logic, of_other("a", 0.4)).unwrap();
+    let b = submit(&mut logic, of_other("b", 0.9)).unwrap();
+    let c = submit(&mut logic, of_other("c", 0.4)).unwrap();
+    assert_eq!((logic.served_by(a), logic.served_by(b), logic.served_by(c)), (Some(b), None, Some(b)));
+    assert_eq!(logic.on_decision_point(0, Tick(0), &[]).pending, 2, "both ways of the greatest priority");
+    let record = imaged(&logic, 0, b);
+    assert_eq!(logic.on_result(&record), 0.9);
+    assert_eq!(logic.count(State::Completed), 1);
+    assert_eq!(logic.count(State::FulfilledByLink), 5);
+    assert_eq!(logic.on_decision_point(1, record.end, &[]).pending, 0);
+    assert_eq!(logic.take_contradictions(), []);
+}
+
+#[test]
+fn the_cancel_of_one_does_not_cost_the_other() {
+    let mut logic = logic();
+    let a = submit(&mut logic, of_other("a", 0.4)).unwrap();
+    let b = submit(&mut logic, of_other("b", 0.9)).unwrap();
+    logic.cancel(b, "ops", "").unwrap();
+    assert_eq!((logic.served_by(a), logic.state(a)), (None, Some(State::Accepted)));
+    assert_eq!(logic.on_decision_point(0, Tick(0), &[]).pending, 2);
+    let b = submit(&mut logic, of_other("b", 0.9)).unwrap();
+    assert_eq!(logic.served_by(a), Some(b));
+    logic.review(b, Review::Hold, "ops", "").unwrap();
+    assert_eq!(logic.served_by(a), None);
+    logic.review(b, Review::Release, "ops", "").unwrap();
+    assert_eq!(logic.served_by(a), Some(b));
+    logic.on_task(chosen(0, b));
+    let c = submit(&mut logic, of_other("c", 1.0)).unwrap();
+    assert_eq!(logic.served_by(c), Some(b), "what is under way is not put off");
+    logic.cancel(a, "ops", "").unwrap();
+    logic.on_result(&record(0, b, Some(FailureReason::Attitude)));
+    assert_eq!((logic.served_by(b), logic.served_by(c)), (Some(c), None));
+    assert_eq!(logic.on_decision_point(1, Tick(900), &[]).pending, 2);
+}
+
+#[test]
+fn imaging_that_is_too_early_for_one_does_not_serve_it() {
+    let mut logic = logic();
+    let a = submit(&mut logic, of_other("a", 0.4)).unwrap();
+    let record = imaged(&logic, 0, a);
+    let later_ns = EPOCH_NS + (record.end.0 + 1) * logic.model.period.nanoseconds();
+    let b = submit(&mut logic, Order { valid_from_ns: later_ns, ..of_other("b", 0.3) }).unwrap();
+    assert_eq!(logic.served_by(b), Some(a));
+    assert_eq!(logic.on_result(&record), 0.4);
+    assert_eq!((logic.state(b), logic.served_by(b)), (Some(State::Accepted), None));
+}
+
+fn strip_of(order_ref: &str, number: u32, longitude_deg: f64) -> Order {
+    let part = Part { order_ref: order_ref.to_owned(), number, of: 3, share: 1.0 / 3.0 };
+    Order { part: Some(part), ..both_ways(&format!("{order_ref} {number}/3"), longitude_deg) }
+}
+
+#[test]
+fn the_strips_of_an_order_are_listed_by_its_number() {
+    let mut logic = logic();
+    let alone = submit(&mut logic, both_ways("alone", 0.0)).unwrap();
+    let first = submit(&mut logic, strip_of("po", 1, 10.0)).unwrap();
+    submit(&mut logic, strip_of("rhein", 1, 20.0)).unwrap();
+    submit(&mut logic, strip_of("po", 2, 30.0)).unwrap();
+    let strips = |logic: &RequestLogic, order| {
+        logic.list(&Filter { order: Some(order), ..Filter::default() }, StripId(0), 100).ids
+    };
+    assert_eq!(strips(&logic, alone), [1, 2].map(StripId));
+    assert_eq!(strips(&logic, first), [3, 4, 7, 8].map(StripId));
+    logic.cancel(StripId(7), "ops", "").unwrap();
+    submit(&mut logic, strip_of("po", 2, 30.0)).unwrap();
+    assert_eq!(strips(&logic, first), [3, 4, 7, 8, 9, 10].map(StripId), "what is asked for again belongs to it");
+    let mut bad = strip_of("po", 4, 40.0);
+    assert_eq!(submit(&mut logic, bad.clone()).unwrap_err().to_string(), "part is 4, outside 1 to parts");
+    bad.part = Some(Part { order_ref: "po".to_owned(), number: 3, of: 3, share: f64::NAN });
+    assert_eq!(submit(&mut logic, bad).unwrap_err().to_string(), "share is NaN, outside 0 to 1");
 }
 
 #[test]

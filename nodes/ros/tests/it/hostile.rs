@@ -170,8 +170,10 @@ fn a_program_of_others_may_take_a_node_s_place_if_that_is_declared() {
 #[test]
 fn a_node_whose_dds_has_died_starts_it_anew() {
     let trial = Trial::new(20);
-    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
-    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
+    // Without the filter that keeps such a datagram from it.
+    let unprotected = "-p packet_filter:=false";
+    let spacecraft = trial.start(graph::SPACECRAFT, unprotected).unwrap();
+    let guidance = trial.start(graph::GUIDANCE, unprotected).unwrap();
     let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
     let received = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
     let summaries = spacecraft.publisher(&graph::REQUEST_SUMMARY).unwrap();
@@ -197,4 +199,35 @@ fn a_node_whose_dds_has_died_starts_it_anew() {
     let operator = trial.start(graph::OPERATOR, "").unwrap();
     let latched = operator.subscription(&graph::REQUEST_SUMMARY).unwrap();
     assert_eq!(latched.wait(operator.signal(), PATIENCE).unwrap().unwrap().tick, 9);
+}
+
+/// The same and others, with the filter: nothing of it arrives, and it is told of.
+#[test]
+fn datagrams_that_would_end_a_node_are_dropped_and_told_of() {
+    let trial = Trial::new(44);
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    let guidance = trial.start(graph::GUIDANCE, "").unwrap();
+    let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
+    let received = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
+    spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
+    let stranger = Stranger::new(trial.domain, 9);
+    let harmful =
+        ["03_nackfrag_base0_56B.hex", "04_heartbeat_long_range_52B.hex", "06_datafrag_4GiB_57B_any_prefix.hex"];
+    for file in harmful {
+        stranger.send_file(file, false);
+        stranger.send_file(file, true);
+    }
+    // Two nodes with two ports each, in one process.
+    let mut dropped = 0;
+    eventually(|| {
+        for notice in guidance.notices() {
+            assert_eq!(notice.trouble, Trouble::Dropped, "{notice}");
+            dropped += notice.count;
+        }
+        (dropped >= 12).then_some(())
+    });
+    for tick in 0..100 {
+        states.publish(&SpacecraftState { tick, ..Default::default() }).unwrap();
+        assert_eq!(received.wait(guidance.signal(), PATIENCE).unwrap().unwrap().tick, tick);
+    }
 }

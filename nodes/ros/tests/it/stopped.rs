@@ -82,7 +82,7 @@ fn a_node_that_was_stopped_goes_on() {
 #[test]
 #[ignore = "the process of another test"]
 fn guidance_of_little_memory() {
-    let guidance = trial_of_parent().start(graph::GUIDANCE, "-p memory_limit_mb:=200").unwrap();
+    let guidance = trial_of_parent().start(graph::GUIDANCE, "-p memory_limit_mb:=200 -p packet_filter:=false").unwrap();
     loop {
         guidance.wait(PATIENCE).unwrap();
     }

@@ -1,4 +1,8 @@
-"""Reads spacecraft states reliably with CycloneDDS: DOMAIN TOPIC TICK; ends when it has seen that tick, or a later one."""
+"""Reads spacecraft states reliably with CycloneDDS: DOMAIN TOPIC TICK [RATE].
+
+Ends when it has seen that tick, or a later one. With a rate it keeps every message, has room for a hundred, and takes so
+many a second.
+"""
 
 import sys
 import time
@@ -51,17 +55,25 @@ class SpacecraftState(IdlStruct, typename="swath_msgs::msg::dds_::SpacecraftStat
 
 def main():
     domain, topic, last = int(sys.argv[1]), sys.argv[2], int(sys.argv[3])
+    rate = float(sys.argv[4]) if len(sys.argv) > 4 else None
     participant = DomainParticipant(domain)
-    qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(20000))
+    reliable, history = Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(20000)
+    qos = Qos(reliable, history)
+    if rate:
+        qos = Qos(reliable, Policy.History.KeepAll, Policy.ResourceLimits(max_samples=100))
     reader = DataReader(participant, Topic(participant, "rt" + topic, SpacecraftState), qos)
+    print("ready")
     received, quiet, tick = 0, time.monotonic(), None
     # What has been seen is told when nothing more comes.
     while tick is None or tick < last or time.monotonic() - quiet < 0.5:
-        for sample in reader.take(1000):
+        for sample in reader.take(1 if rate else 1000):
+            # The writer has gone.
+            if not sample.sample_info.valid_data:
+                continue
             if received == 0:
                 print("reading")
             received, quiet, tick = received + 1, time.monotonic(), sample.tick
-        time.sleep(0.001)
+        time.sleep(1 / rate if rate else 0.001)
     print(f"{received} received, the last is {tick}")
 
 

@@ -149,19 +149,19 @@ impl GuidanceNode {
             self.take_task(&message)?;
         }
         let wait = self.mind_question()?;
-        self.base.node.wait(wait)?;
+        self.base.wait(wait)?;
         Ok(())
     }
 
     fn take_states(&mut self) -> Result<()> {
         while let Some(message) = self.truths.as_ref().map_or(Ok(None), Subscription::take)? {
-            match state_sample(&message) {
+            match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
                 Ok(truth) => _ = self.unpaired.1.insert(truth.tick, truth.body),
                 Err(error) => self.base.alarm(Severity::Error, "truth refused", &error.to_string())?,
             }
         }
         while let Some(message) = self.states.take()? {
-            match state_sample(&message) {
+            match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
                 Ok(state) => self.unpaired.0.push_back(state),
                 Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
             }

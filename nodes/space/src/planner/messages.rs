@@ -82,7 +82,10 @@ pub fn planner_status(stamper: &Stamper, now: Tick, logic: &PlannerLogic, strip:
         proposal: proposal.number,
         strip,
         t_pre_ticks: proposal.t_pre,
+        t_pre_s: stamper.seconds(proposal.t_pre),
         window_close_tick: proposal.candidate.window.close.0,
+        window_close: stamper.time(proposal.candidate.window.close),
+        deadline: proposal.deadline.map(|deadline| stamper.time(deadline)).unwrap_or_default(),
         deadline_tick: proposal.deadline.map_or(0, |deadline| deadline.0),
         ..status
     }

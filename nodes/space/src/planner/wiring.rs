@@ -127,7 +127,8 @@ impl PlannerNode {
             }
             let started = Instant::now();
             let previous = point.result.first().map(task_record).transpose();
-            match situation(&point).and_then(|situation| Ok((situation, previous?))) {
+            let situation = self.base.tick(point.tick).and_then(|_| situation(&point));
+            match situation.and_then(|situation| Ok((situation, previous?))) {
                 Ok((situation, previous)) => {
                     let planned = self.logic.on_decision_point(point.task, situation, previous);
                     self.publish(planned, started)?;
@@ -148,7 +149,7 @@ impl PlannerNode {
         }
         self.take_orders()?;
         self.tell_status()?;
-        self.base.node.wait(IDLE)?;
+        self.base.wait(IDLE)?;
         Ok(())
     }
 

@@ -84,14 +84,14 @@ fn frames(base: &MissionNode, sample: &StateSample, cos: f64, sin: f64) -> TFMes
     let [w, x, y, z] = mrp::to_euler_parameters(&sample.body.sigma_BN);
     let body = TransformStamped {
         header: header.clone(),
-        child_frame_id: BODY_FRAME.to_owned(),
+        child_frame_id: base.stamper.frame(BODY_FRAME),
         transform: Transform { translation: vector3(&sample.r_BN_N), rotation: Quaternion { x, y, z, w } },
     };
     // Half-angle from the angle's cosine and sine.
     let half = 0.5 * sin.atan2(cos);
     let earth = TransformStamped {
         header,
-        child_frame_id: EARTH_FRAME.to_owned(),
+        child_frame_id: base.stamper.frame(EARTH_FRAME),
         transform: Transform {
             rotation: Quaternion { x: 0.0, y: 0.0, z: half.sin(), w: half.cos() },
             ..Transform::default()

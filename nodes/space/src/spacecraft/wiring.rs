@@ -142,7 +142,7 @@ impl SpacecraftNode {
                 progress = Instant::now();
             }
             if !self.logic.ready() {
-                self.base.node.wait(RESEND_AFTER)?;
+                self.base.wait(RESEND_AFTER)?;
             }
         }
         Ok(())
@@ -160,7 +160,7 @@ impl SpacecraftNode {
             let now = Instant::now();
             let wanted = if self.logic.ready() { due } else { latest };
             if now < wanted {
-                self.base.node.wait(wanted - now)?;
+                self.base.wait(wanted - now)?;
                 continue;
             }
             due += tick;
@@ -222,7 +222,7 @@ impl SpacecraftNode {
             tracing::warn!("not every reader has the last state and time");
         }
         while !self.base.shutdown.asked() {
-            self.base.node.wait(FLUSH_TIMEOUT)?;
+            self.base.wait(FLUSH_TIMEOUT)?;
             // The last state is the one that ends the mission: it must arrive.
             while self.commands.take()?.is_some() {}
         }

@@ -1,4 +1,4 @@
-//! The six parameter services of a node, and its news on `/parameter_events`.
+//! The services that every node has, six for its parameters and one for types, and its news on `/parameter_events`.
 
 use swath_msgs::rcl_interfaces::{
     DescribeParameters, DescribeParametersResponse, GetParameterTypes, GetParameterTypesResponse, GetParameters,
@@ -6,6 +6,7 @@ use swath_msgs::rcl_interfaces::{
     Parameter, ParameterDescriptor, ParameterEvent, ParameterType, ParameterValue, SetParameters,
     SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersResponse, SetParametersResult,
 };
+use swath_msgs::type_description_interfaces::GetTypeDescription;
 
 use crate::clock::SimClock;
 use crate::error::RosError;
@@ -13,10 +14,11 @@ use crate::params::Parameters;
 use crate::service::Server;
 use crate::signal::Signal;
 use crate::topic::Publisher;
+use crate::type_description;
 use crate::value::Value;
 
-/// The servers of the six services, and the publisher of changes.
-pub(crate) struct ParameterServices {
+/// The servers, and the publisher of changes.
+pub(crate) struct NodeServices {
     pub(crate) node: String,
     pub(crate) parameters: Parameters,
     pub(crate) clock: SimClock,
@@ -26,10 +28,11 @@ pub(crate) struct ParameterServices {
     pub(crate) list: Server<ListParameters>,
     pub(crate) set: Server<SetParameters>,
     pub(crate) set_atomically: Server<SetParametersAtomically>,
+    pub(crate) describe_type: Server<GetTypeDescription>,
     pub(crate) events: Publisher<ParameterEvent>,
 }
 
-impl ParameterServices {
+impl NodeServices {
     pub(crate) fn set_signal(&mut self, signal: &Signal) {
         self.describe.set_signal(signal);
         self.get.set_signal(signal);
@@ -37,6 +40,7 @@ impl ParameterServices {
         self.list.set_signal(signal);
         self.set.set_signal(signal);
         self.set_atomically.set_signal(signal);
+        self.describe_type.set_signal(signal);
     }
 
     /// Answers what has been asked, and tells of what has changed.
@@ -57,6 +61,7 @@ impl ParameterServices {
         })?;
         self.set_atomically
             .answer_all(|request| SetParametersAtomicallyResponse { result: set(parameters, request.parameters) })?;
+        self.describe_type.answer_all(|request| type_description::answer(&request))?;
         self.tell_changes()
     }
 

@@ -1,0 +1,154 @@
+//! What readers of CycloneDDS that sleep, die or lag cost a mission: `cargo xtask soak guests`, or `soak_guests FIRST COUNT`
+//! for some seeds; prints one JSON object.
+//!
+//! For each seed a mission is flown in lockstep and paced: alone, with one reader of every state that is stopped, with
+//! ten that read, and with ten of which two are stopped, two are killed and one takes ten messages a second. Speeds are
+//! told as shares: with one that is stopped of that alone, with ten of that with ten that read. The tasks must be those
+//! of the same mission in one process.
+#![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
+
+#[path = "common/flight.rs"]
+mod flight;
+
+use std::collections::BTreeMap;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+use flight::{Flight, python, signal};
+use serde_json::{Value, json};
+
+const DOMAIN: u16 = 149;
+const MISSION: &str = "planner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";
+/// Orbits and paces of the two kinds of missions: twenty seconds each.
+const KINDS: [(&str, &str, &str); 2] = [("lockstep", "20", "0"), ("paced", "2", "500")];
+const STATES: &str = "/swath/spacecraft/state";
+
+fn main() -> Result<()> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let result = match args[..] {
+        ["--plan"] => json!({ "seeds": 5, "chunk": 1 }),
+        [first, count] => {
+            let first: u64 = first.parse()?;
+            measure(first..first + count.parse::<u64>()?)?
+        }
+        _ => bail!("usage: soak_guests --plan | FIRST COUNT"),
+    };
+    println!("{result}");
+    Ok(())
+}
+
+fn measure(seeds: std::ops::Range<u64>) -> Result<Value> {
+    let folder = tempfile::tempdir()?;
+    let mission = folder.path().join("mission.toml");
+    std::fs::write(&mission, MISSION)?;
+    let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut differ = 0;
+    for seed in seeds {
+        for (kind, orbits, pace) in KINDS {
+            let words = ["--seed", &seed.to_string(), "--orbits", orbits, "--pace", pace, "--no-bag"];
+            let out = |name: &str| folder.path().join(format!("{kind}-{seed}-{name}"));
+            let alone = Flight::launch(&mission, &out("in-process"), DOMAIN, &[&words[..], &["--in-process"]].concat());
+            let (_, _, expected) = alone?.end()?;
+            let mut fly = |name: &str, guests: &[Habit]| -> Result<f64> {
+                let (factor, tasks) = fly(&mission, &out(name), &words, guests)?;
+                differ += u64::from(tasks != expected);
+                eprintln!("{kind}, seed {seed}, {name}: {factor:.0} times real time");
+                Ok(factor)
+            };
+            let (alone, stopped) = (fly("alone", &[])?, fly("one-stopped", &[Habit::Stopped])?);
+            let (healthy, mixed) = (fly("ten-healthy", &[Habit::Healthy; 10])?, fly("ten-mixed", &Habit::MIXED)?);
+            shares.entry(format!("{kind}_one_stopped_share")).or_default().push(stopped / alone);
+            shares.entry(format!("{kind}_ten_mixed_share")).or_default().push(mixed / healthy);
+        }
+    }
+    let mut result = json!(shares);
+    result["missions_with_other_tasks"] = differ.into();
+    Ok(result)
+}
+
+/// Flies a mission with guests: its speed and its tasks.
+fn fly(mission: &Path, out: &Path, words: &[&str], guests: &[Habit]) -> Result<(f64, String)> {
+    let mut guests = guests.iter().map(|habit| Guest::start(*habit)).collect::<Result<Vec<_>>>()?;
+    for guest in &mut guests {
+        ensure!(guest.line()? == "ready", "a reader did not come up");
+    }
+    let mut flight = Flight::launch(mission, out, DOMAIN, words)?;
+    flight.wait_for_tasks(1)?;
+    for guest in &mut guests {
+        ensure!(guest.line()? == "reading", "a reader does not read");
+    }
+    guests.iter().for_each(Guest::misbehave);
+    let (well, summary, tasks) = flight.end()?;
+    ensure!(well, "the mission failed: {}", flight.said());
+    Ok((summary.real_time_factor, tasks))
+}
+
+#[derive(Clone, Copy)]
+enum Habit {
+    Healthy,
+    Stopped,
+    Killed,
+    Slow,
+}
+
+impl Habit {
+    const MIXED: [Self; 10] = [
+        Self::Stopped,
+        Self::Stopped,
+        Self::Killed,
+        Self::Killed,
+        Self::Slow,
+        Self::Healthy,
+        Self::Healthy,
+        Self::Healthy,
+        Self::Healthy,
+        Self::Healthy,
+    ];
+}
+
+/// A reader of CycloneDDS in a process of its own.
+struct Guest {
+    habit: Habit,
+    child: Child,
+    lines: BufReader<std::process::ChildStdout>,
+}
+
+impl Guest {
+    fn start(habit: Habit) -> Result<Self> {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("ros/tests/python/reader.py");
+        let mut command = Command::new(python()?);
+        command.arg("-u").arg(script).args([&DOMAIN.to_string(), STATES, &u64::MAX.to_string()]);
+        if matches!(habit, Habit::Slow) {
+            command.arg("10");
+        }
+        command.env("CYCLONEDDS_URI", "<General><Interfaces><NetworkInterface name='lo'/></Interfaces></General>");
+        let mut child = command.stdout(Stdio::piped()).spawn()?;
+        let lines = BufReader::new(child.stdout.take().context("a reader without output")?);
+        Ok(Self { habit, child, lines })
+    }
+
+    fn line(&mut self) -> Result<String> {
+        let mut line = String::new();
+        self.lines.read_line(&mut line)?;
+        Ok(line.trim().to_owned())
+    }
+
+    fn misbehave(&self) {
+        match self.habit {
+            Habit::Stopped => signal(self.child.id(), "-STOP"),
+            Habit::Killed => signal(self.child.id(), "-KILL"),
+            Habit::Healthy | Habit::Slow => {}
+        }
+    }
+}
+
+impl Drop for Guest {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

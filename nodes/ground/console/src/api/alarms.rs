@@ -1,0 +1,88 @@
+//! Alarms: what operators have seen, and what they do not want to see for a while.
+
+use std::sync::Arc;
+
+use axum::Extension;
+use axum::extract::State;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::answers::DOOR;
+use crate::extract::Json;
+use crate::guard::Caller;
+use crate::problem::Problem;
+use crate::server::{Home, Server};
+
+pub(super) fn routes() -> OpenApiRouter<Arc<Server>> {
+    OpenApiRouter::new().routes(routes!(acknowledge)).routes(routes!(shelve))
+}
+
+/// Alarms that an operator has seen.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct Seen {
+    /// Their numbers.
+    ids: Vec<u64>,
+}
+
+/// Alarms that are put aside.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct Aside {
+    /// Their numbers.
+    ids: Vec<u64>,
+    /// For how long, in simulated time [min].
+    #[schema(minimum = 1, maximum = 100_000)]
+    minutes: u32,
+    /// Why.
+    #[serde(default)]
+    #[schema(max_length = 1000)]
+    reason: String,
+}
+
+/// How many alarms it counted for.
+#[derive(Serialize, ToSchema)]
+struct Count {
+    count: usize,
+}
+
+/// Longest time for which alarms are put aside [min], and longest reason [characters].
+const MINUTES_MAX: u32 = 100_000;
+const REASON_MAX: usize = 1000;
+
+/// Says that alarms have been seen, in every browser.
+#[utoipa::path(post, path = "/api/alarms/acknowledge", tag = "console", request_body = Seen,
+    responses((status = 200, body = Count), Problem))]
+async fn acknowledge(
+    State(server): Home,
+    Extension(caller): Extension<Caller>,
+    Json(seen): Json<Seen>,
+) -> Result<Json<Count>, Problem> {
+    server.counter()?;
+    let actor = caller.actor(DOOR);
+    let count =
+        server.site.shared.update(|ledger| seen.ids.iter().filter(|id| ledger.acknowledge(**id, &actor)).count());
+    Ok(Json(Count { count }))
+}
+
+/// Puts alarms aside for a while: raised again, they do not count until then.
+#[utoipa::path(post, path = "/api/alarms/shelve", tag = "console", request_body = Aside,
+    responses((status = 200, body = Count), Problem))]
+async fn shelve(
+    State(server): Home,
+    Extension(caller): Extension<Caller>,
+    Json(aside): Json<Aside>,
+) -> Result<Json<Count>, Problem> {
+    server.counter()?;
+    if !(1..=MINUTES_MAX).contains(&aside.minutes) || aside.reason.chars().count() > REASON_MAX {
+        return Err(Problem::bad(format!("minutes must be 1 to {MINUTES_MAX}, reason up to {REASON_MAX} characters")));
+    }
+    let (actor, minutes) = (caller.actor(DOOR), aside.minutes);
+    let count = server
+        .site
+        .shared
+        .update(|ledger| aside.ids.iter().filter(|id| ledger.shelve(**id, minutes, &actor, &aside.reason)).count());
+    Ok(Json(Count { count }))
+}

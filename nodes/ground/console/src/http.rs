@@ -1,0 +1,119 @@
+//! The port: connections with limits, with or without TLS, each answered by the routes.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use rustls::ServerConfig;
+use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio_rustls::TlsAcceptor;
+
+use crate::routes;
+use crate::server::Site;
+
+/// Connections at a time.
+const CONNECTIONS: usize = 256;
+/// How long a request's head may take to arrive, and how long TLS may take to begin.
+const HEAD_TIME: Duration = Duration::from_secs(10);
+/// How long to wait when connections cannot be taken.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Opens the port; of another address than this machine's own only where there is TLS.
+///
+/// # Errors
+/// When the address can be reached from elsewhere in the clear, or cannot be used.
+pub fn listen(address: SocketAddr, tls: bool) -> Result<std::net::TcpListener> {
+    ensure!(
+        address.ip().is_loopback() || tls,
+        "{address} can be reached from other machines: that needs --tls-cert, --tls-key and tokens \
+         (swath console token add), or listen on 127.0.0.1 and use `ssh -L`"
+    );
+    let listener = std::net::TcpListener::bind(address).with_context(|| format!("cannot listen on {address}"))?;
+    listener.set_nonblocking(true).context("cannot use the port without waiting")?;
+    Ok(listener)
+}
+
+/// TLS with a certificate and its key, both in PEM.
+///
+/// # Errors
+/// When a file cannot be read, or the two do not belong together.
+pub fn tls(certificate: &Path, key: &Path) -> Result<Arc<ServerConfig>> {
+    let unreadable = |path: &Path| format!("cannot read {}", path.display());
+    let chain: Vec<_> = CertificateDer::pem_file_iter(certificate)
+        .and_then(Iterator::collect::<Result<_, _>>)
+        .with_context(|| unreadable(certificate))?;
+    ensure!(!chain.is_empty(), "{} holds no certificate", certificate.display());
+    let key = PrivateKeyDer::from_pem_file(key).with_context(|| unreadable(key))?;
+    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let config = ServerConfig::builder_with_provider(provider)
+        .with_safe_default_protocol_versions()
+        .context("no version of TLS")?
+        .with_no_client_auth()
+        .with_single_cert(chain, key)
+        .context("certificate and key do not belong together")?;
+    Ok(Arc::new(config))
+}
+
+/// Answers until the process ends.
+///
+/// # Errors
+/// When the runtime cannot start.
+pub fn serve(listener: std::net::TcpListener, tls: Option<Arc<ServerConfig>>, site: Site) -> Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("no runtime")?;
+    runtime.block_on(async move {
+        let listener = TcpListener::from_std(listener).context("cannot listen")?;
+        accept(&listener, tls.map(TlsAcceptor::from), &routes::router(site)).await;
+        Ok(())
+    })
+}
+
+async fn accept(listener: &TcpListener, tls: Option<TlsAcceptor>, router: &Router) {
+    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    loop {
+        // The semaphore is never closed.
+        let Ok(place) = Arc::clone(&places).acquire_owned().await else { return };
+        match listener.accept().await {
+            Ok((stream, _)) => {
+                let (tls, router) = (tls.clone(), router.clone());
+                tokio::spawn(async move {
+                    greet(stream, tls, router).await;
+                    drop(place);
+                });
+            }
+            // Out of file descriptors, for one: others may close theirs.
+            Err(error) => {
+                tracing::warn!("a connection was not taken: {error}");
+                tokio::time::sleep(PAUSE).await;
+            }
+        }
+    }
+}
+
+async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router) {
+    let Some(tls) = tls else { return converse(stream, router).await };
+    match tokio::time::timeout(HEAD_TIME, tls.accept(stream)).await {
+        Ok(Ok(stream)) => converse(stream, router).await,
+        Ok(Err(error)) => tracing::debug!("a connection without TLS: {error}"),
+        Err(_) => tracing::debug!("a connection that did not begin TLS"),
+    }
+}
+
+async fn converse<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(stream: S, router: Router) {
+    let conversation = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HEAD_TIME)
+        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+    if let Err(error) = conversation.await {
+        tracing::debug!("a connection has ended: {error}");
+    }
+}

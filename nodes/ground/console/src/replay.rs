@@ -1,0 +1,108 @@
+//! A recorded mission: its bag told to the ledger, message by message.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use swath_bags::cli::{MANIFEST, MANIFEST_TEXT};
+use swath_bags::schema::{Schema, adapt};
+use swath_bags::{Bag, BagTopic, Filter, Topic, TopicPattern};
+use swath_mission::file::Mission;
+use swath_msgs::RosMessage;
+use swath_msgs::swath_msgs as msg;
+use swath_ros::{Cdr, decode, graph};
+
+use crate::ledger::Ledger;
+
+/// What a bag says of itself.
+pub struct Recording {
+    /// Name of the mission.
+    pub title: String,
+    /// Least elevation of the satellite over a target's horizon [deg].
+    pub elevation_min_deg: f64,
+}
+
+/// Reads a bag into the ledger.
+///
+/// # Errors
+/// When the bag cannot be read, or holds no mission of this namespace.
+pub fn read(path: &Path, namespace: &str, ledger: &mut Ledger) -> Result<Recording> {
+    let bag = Bag::open(path)?;
+    let recording = recording(&bag).with_context(|| format!("{} holds no mission", path.display()))?;
+    let readers = readers(&bag, namespace.trim_end_matches('/'))?;
+    let names: Vec<String> = bag.topics().iter().map(|topic| topic.topic.name.clone()).collect();
+    let wanted: Vec<String> =
+        names.iter().zip(&readers).filter(|(_, reader)| reader.is_some()).map(|(name, _)| name.clone()).collect();
+    if wanted.is_empty() {
+        bail!("the bag has no topic of {namespace}: is --namespace right?");
+    }
+    let topics = TopicPattern::new(&wanted, None, None)?;
+    let mut messages = bag.messages(&Filter { topics, ..Filter::default() })?;
+    while let Some(message) = messages.next()? {
+        if let Some(reader) = readers.get(message.topic).and_then(Option::as_ref) {
+            let time = message.log_time;
+            reader(ledger, message.data).with_context(|| format!("{} at {time} ns", names[message.topic]))?;
+        }
+    }
+    Ok(recording)
+}
+
+/// Tells the ledger of a message of one topic.
+type Reader = Box<dyn Fn(&mut Ledger, &[u8]) -> Result<()>>;
+
+/// A reader for each topic of the bag that the console knows.
+fn readers(bag: &Bag, namespace: &str) -> Result<Vec<Option<Reader>>> {
+    // Before the request manager settled rewards, guidance told of tasks that ended.
+    let settled = format!("{namespace}/{}", graph::TASK_RESULTS.entry.name);
+    let settled_apart = bag.topics().iter().any(|topic| topic.topic.name == settled);
+    let tell_of_points = move |ledger: &mut Ledger, point: &msg::DecisionPoint| {
+        if !settled_apart {
+            point.result.iter().for_each(|result| ledger.result(result));
+        }
+    };
+    let of = |topic: &BagTopic| -> Result<Option<Reader>> {
+        let topic = &topic.topic;
+        let name = topic.name.strip_prefix(namespace).and_then(|name| name.strip_prefix('/')).unwrap_or(&topic.name);
+        let is = |entry: graph::Entry| entry.name == name;
+        Ok(Some(match name {
+            _ if is(graph::STRIP_EVENTS.entry) => reader(topic, Ledger::strip)?,
+            _ if is(graph::SUB_SATELLITE_POINT.entry) => reader(topic, Ledger::point)?,
+            _ if is(graph::WHEELS.entry) => reader(topic, Ledger::wheels)?,
+            _ if is(graph::GUIDANCE_STATUS.entry) => reader(topic, Ledger::guidance)?,
+            _ if is(graph::PLANNER_TASK.entry) => reader(topic, Ledger::task)?,
+            _ if is(graph::TASK_RESULTS.entry) => reader(topic, Ledger::result)?,
+            _ if is(graph::DECISION_POINT.entry) => reader(topic, tell_of_points)?,
+            _ if is(graph::UPCOMING_STRIPS.entry) => reader(topic, Ledger::offer)?,
+            _ if is(graph::PLANNER_DECISION.entry) => reader(topic, Ledger::choice)?,
+            _ if is(graph::PLANNER_STATUS.entry) => reader(topic, Ledger::planner)?,
+            _ if is(graph::REQUEST_SUMMARY.entry) => reader(topic, Ledger::summary)?,
+            _ if is(graph::DIAGNOSTICS.entry) => reader(topic, Ledger::diagnostics)?,
+            _ => return Ok(None),
+        }))
+    };
+    bag.topics().iter().map(of).collect()
+}
+
+/// What an earlier version recorded is read by what the recording says of its types.
+fn reader<M: RosMessage + 'static>(topic: &Topic, tell: impl Fn(&mut Ledger, &M) + 'static) -> Result<Reader> {
+    ensure!(
+        topic.type_name == M::TYPE_NAME,
+        "topic {} is of type {}, not {}",
+        topic.name,
+        topic.type_name,
+        M::TYPE_NAME
+    );
+    let own = Schema::parse(M::TYPE_NAME, M::SCHEMA)?;
+    let then = Schema::of(topic)?;
+    Ok(Box::new(move |ledger, data| {
+        let data = if then == own { data.to_vec() } else { adapt(&then, &own, data)? };
+        tell(ledger, &decode(&Cdr::from_bytes(data))?);
+        Ok(())
+    }))
+}
+
+fn recording(bag: &Bag) -> Result<Recording> {
+    let manifest = bag.metadata_named(MANIFEST).with_context(|| format!("no metadata record {MANIFEST}"))?;
+    let text = manifest.get(MANIFEST_TEXT).with_context(|| format!("{MANIFEST} has no entry {MANIFEST_TEXT}"))?;
+    let mission: Mission = toml::from_str(text).with_context(|| format!("{MANIFEST} is no mission"))?;
+    Ok(Recording { title: mission.name.clone(), elevation_min_deg: mission.sim.imaging.elevation_min_deg })
+}

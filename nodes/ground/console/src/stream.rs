@@ -1,0 +1,78 @@
+//! The facts as server-sent events: batches in order, from where the reader was, for as long as it reads.
+
+use std::time::Duration;
+
+use http_body_util::channel::{Channel, Sender};
+use hyper::body::Bytes;
+
+use crate::shared::Shared;
+
+/// Facts of one event.
+const BATCH: usize = 2000;
+/// Between events to a reader that has read everything: ten a second.
+const PAUSE: Duration = Duration::from_millis(100);
+/// A reader that is gone is noticed when something is written to it.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+
+/// Where a reader was: how many facts it has read in which run of the server.
+#[must_use]
+pub fn place(last_event_id: Option<&str>, run: &str) -> Option<usize> {
+    let (of, count) = last_event_id?.rsplit_once('.')?;
+    if of == run { count.parse().ok() } else { None }
+}
+
+/// The body of an answer that tells the facts after `after`; a reader that was elsewhere begins anew.
+pub fn body(shared: Shared, run: String, after: Option<usize>) -> Channel<Bytes> {
+    let (sender, body) = Channel::new(1);
+    tokio::spawn(tell(shared, run, after, sender));
+    body
+}
+
+async fn tell(shared: Shared, run: String, after: Option<usize>, mut sender: Sender<Bytes>) {
+    let mut news = shared.watch();
+    let known = after.filter(|after| *after <= *news.borrow_and_update());
+    let mut at = known.unwrap_or(0);
+    // Data is needed for an event to count.
+    let greeting = if known.is_some() { ": here you are\n\n" } else { "event: restart\ndata: 0\n\n" };
+    if sender.send_data(Bytes::from_static(greeting.as_bytes())).await.is_err() {
+        return;
+    }
+    loop {
+        let (last, facts) = shared.batch(at, BATCH);
+        if last > at {
+            let event = format!("event: facts\nid: {run}.{last}\ndata: {facts}\n\n");
+            if sender.send_data(event.into()).await.is_err() {
+                return;
+            }
+            if last - at < BATCH {
+                tokio::time::sleep(PAUSE).await;
+            }
+            at = last;
+            continue;
+        }
+        match tokio::time::timeout(SIGN_OF_LIFE, news.changed()).await {
+            Ok(Ok(())) => {}
+            Ok(Err(_)) => return,
+            Err(_) => {
+                if sender.send_data(Bytes::from_static(b": still here\n\n")).await.is_err() {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::place;
+
+    #[test]
+    fn a_place_counts_in_its_own_run() {
+        assert_eq!(place(Some("17.42"), "17"), Some(42));
+        assert_eq!(place(Some("16.42"), "17"), None);
+        for nonsense in ["", "42", "17.", "17.-1", "17.x"] {
+            assert_eq!(place(Some(nonsense), "17"), None, "{nonsense}");
+        }
+        assert_eq!(place(None, "17"), None);
+    }
+}
