@@ -524,7 +524,10 @@ mod tests {
             polygon.extend(hole.map(|hole| star(middle, &radii.iter().map(|radius| radius * hole).collect::<Vec<_>>())));
             let cover = cover(std::slice::from_ref(&polygon), &swath()).unwrap();
             prop_assert!(cover.strips.iter().all(|(arc, _)| (20.0 - 1e-3..=500.0 + 1e-3).contains(&(arc.length * EARTH_KM))));
-            prop_assert!(cover.covered > 0.99 && cover.twice < 0.15, "{} {}", cover.covered, cover.twice);
+            // A ring that is thinner than a swath somewhere cannot be seen without seeing beside it, and so twice.
+            let thin = hole.is_some_and(|hole| radii.iter().any(|radius| radius * (1.0 - hole) < 12.0));
+            let most = if thin { 0.25 } else { 0.15 };
+            prop_assert!(cover.covered > 0.99 && cover.twice < most, "{} {}", cover.covered, cover.twice);
             let (shown, twice) = looked_at(&polygon, &cover, middle, 500.0);
             prop_assert!((shown - cover.covered).abs() < 0.02 && (twice - cover.twice).abs() < 0.12, "{} {}", shown, twice);
         }
