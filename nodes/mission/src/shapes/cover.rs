@@ -529,7 +529,9 @@ mod tests {
             let most = if thin { 0.25 } else { 0.15 };
             prop_assert!(cover.covered > 0.99 && cover.twice < most, "{} {}", cover.covered, cover.twice);
             let (shown, twice) = looked_at(&polygon, &cover, middle, 500.0);
-            prop_assert!((shown - cover.covered).abs() < 0.02 && (twice - cover.twice).abs() < 0.12, "{} {}", shown, twice);
+            // Few of the points that are looked at lie in a thin ring.
+            let near = if thin { most } else { 0.12 };
+            prop_assert!((shown - cover.covered).abs() < 0.02 && (twice - cover.twice).abs() < near, "{} {}", shown, twice);
         }
 
         #[test]
