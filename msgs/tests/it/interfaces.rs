@@ -41,9 +41,9 @@ fn type_hashes_are_those_of_ros_2() {
         // Ours, as PyPI `rosbags` computes them from the same files.
         ("swath_msgs/msg/SpacecraftState", "16783b07aaee856ca0c4713fb390a58816887ca775c80800644e7d6539b6fee4"),
         ("swath_msgs/msg/WheelTorque", "7fe6a49598a7850b3e16f4f679a54ff8c430bddf50c8b4d4dcb8894f6a57d034"),
-        ("swath_msgs/msg/DecisionPoint", "1434ab72661b60ec6b504d5428f03db685c1538e3dbe0f8a95a616a1b5d5fe80"),
-        ("swath_msgs/msg/StripReport", "3aa2ee64544d095aac4be44fe0bc17efdad0804d419b87c4dd6a8145cdbcc056"),
-        ("swath_msgs/msg/PlannerStatus", "3df64d3c75cb3fd1a6ef4e97a9be8ccebea4a694a0f92007885a8d96992ddbe9"),
+        ("swath_msgs/msg/DecisionPoint", "5762f4ee32af8953e3d20ad8ef6f9748371c44138f43483ce30673747e9c362d"),
+        ("swath_msgs/msg/StripReport", "c258448b77b7a230a9c5f0ce6ea791529830dd879ea121f32c2dc172ff2582e0"),
+        ("swath_msgs/msg/PlannerStatus", "693426a82532062a8b00ee5e42990f5cf4ae24c3595d168cefbb1cc1fc42e501"),
         ("swath_msgs/msg/Decision", "6cf2e48f3726d92af6cb2751a1f9f66fc0e245b7cf45938fba0eeedc9f0e6219"),
         ("swath_msgs/msg/UpcomingStrips", "85f1f6c705dd469a2336343601f3c88e50235420c6d1857e61fa7d695185ed23"),
     ] {
@@ -144,7 +144,7 @@ fn bounded_sequence_and_flags_have_the_bytes_that_cdr_prescribes() {
     point.result.push(TaskResult { task: 3, success: true, ..TaskResult::default() });
     let bytes = cdr(&point);
     // Header 16 (empty frame: 4 + 1 zero, padded), tick, task, then the state.
-    let before_flag = 16 + 8 + 8 + (16 + 8 + 18 * 8) + 6 * 8;
+    let before_flag = 16 + 8 + 8 + (16 + 8 + 18 * 8) + 9 * 8;
     assert_eq!(bytes[before_flag..before_flag + 8], [1, 0, 0, 0, 1, 0, 0, 0]);
     assert_eq!(bytes[before_flag + 8..before_flag + 16], 3_u64.to_le_bytes());
     round_trip(&point);

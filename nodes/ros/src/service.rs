@@ -218,19 +218,37 @@ impl<S: RosService> Client<S> {
     /// # Errors
     /// If no response comes in that time; the server may have received the request nevertheless.
     pub fn call(&self, request: S::Request, timeout: Duration) -> Result<S::Response, RosError> {
-        let deadline = Instant::now() + timeout;
-        let id = self.send(request)?;
+        self.call_repeatedly(request, timeout, timeout)
+    }
+
+    /// Sends a request once in each interval until one of them is answered, however late: only for requests that do no
+    /// harm when they come twice.
+    ///
+    /// # Errors
+    /// If no response comes in that time; the server may have received the request nevertheless.
+    pub fn call_repeatedly(
+        &self,
+        request: S::Request,
+        interval: Duration,
+        timeout: Duration,
+    ) -> Result<S::Response, RosError> {
+        let begin = Instant::now();
+        let mut sent = vec![self.send(request.clone())?];
         loop {
             while let Some((answered, response)) = self.take()? {
-                if answered == id {
+                if sent.contains(&answered) {
                     return Ok(response);
                 }
             }
-            let remaining = deadline.saturating_duration_since(Instant::now());
-            if remaining.is_zero() {
+            let waited = begin.elapsed();
+            if waited >= timeout {
                 return Err(RosError::NoAnswer { service: self.service.clone(), waited: timeout });
             }
-            self.signal.wait(remaining);
+            let due = interval.saturating_mul(sent.len() as u32);
+            if waited >= due {
+                sent.push(self.send(request.clone())?);
+            }
+            self.signal.wait(due.min(timeout).saturating_sub(waited));
         }
     }
 

@@ -91,6 +91,12 @@ class StripStatus(IdlStruct, typename="swath_msgs::msg::dds_::StripStatus_"):
     linked_to: uint64
     supersedes: uint64
     superseded_by: uint64
+    order_id: uint64
+    order_ref: str
+    part: uint32
+    parts: uint32
+    share: float64
+    served_by: uint64
 
 
 @dataclass
@@ -110,6 +116,10 @@ class StripRequest(IdlStruct, typename="swath_msgs::msg::dds_::StripRequest_"):
     valid_until: Time
     hold_for_approval: bool
     max_attempts: uint32
+    order_ref: str
+    part: uint32
+    parts: uint32
+    share: float64
 
 
 @dataclass
@@ -119,6 +129,8 @@ class SubmitResult(IdlStruct, typename="swath_msgs::msg::dds_::SubmitResult_"):
     id: uint64
     reason_code: uint16
     reason: str
+    known: bool
+    state: uint8
 
 
 @dataclass
@@ -167,9 +179,11 @@ class Opportunity(IdlStruct, typename="swath_msgs::msg::dds_::Opportunity_"):
     window_open: Time
     window_close: Time
     t_acq_ticks: uint32
+    t_acq_s: float64
     min_elevation: float64
     transition_found: bool
     transition_ticks: uint32
+    transition_s: float64
     conflicts: uint32
     conflict_ids: sequence[uint64, 16]
 
@@ -256,7 +270,7 @@ class Peer:
 def request(reference, latitude, longitude):
     return StripRequest(
         reference, "peer", reference, latitude, longitude, latitude + 1.0, longitude + 1.5, 0.9, 3000.0,
-        False, Time(0, 0), Time(0, 0), False, 0,
+        False, Time(0, 0), Time(0, 0), False, 0, "", 0, 0, 0.0,
     )
 
 

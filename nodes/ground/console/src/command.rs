@@ -162,6 +162,16 @@ fn end(text: &str, now_ns: u64) -> Result<u64> {
     Ok(end)
 }
 
+/// Checks a name under which other machines know this one: the port is that of --listen.
+fn check_host(name: &str) -> Result<()> {
+    let v6 = name.starts_with('[') && name.ends_with(']');
+    ensure!(
+        !name.is_empty() && (v6 || !name.contains([':', '/'])),
+        "--host {name}: expected a name or an address, without scheme and port; IPv6 in brackets"
+    );
+    Ok(())
+}
+
 /// The open port, and who is let in by it.
 struct Door {
     listener: std::net::TcpListener,
@@ -188,6 +198,7 @@ impl Door {
                 SocketAddr::V6(it) => format!("[{}]", it.ip()),
             });
         }
+        names.iter().try_for_each(|name| check_host(name))?;
         let path = args.tokens.clone().map_or_else(usual_file, Ok)?;
         let tokens = Tokens::read(&path)?.tokens.len();
         ensure!(tokens > 0, "{} holds no tokens: nobody could look (swath console token add)", path.display());
@@ -274,7 +285,7 @@ fn wait_for_the_end() -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::end;
+    use super::{check_host, end};
 
     #[test]
     fn tokens_end_at_a_time_or_after_a_while() {
@@ -284,6 +295,16 @@ mod tests {
         assert_eq!(end("1970-01-02T00:00:00Z", 0).unwrap(), day);
         for wrong in ["", "d", "-1d", "0d", "1970-01-01T00:00:00Z", "99999999999d", "soon"] {
             assert!(end(wrong, 0).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_host_is_a_name_without_a_port() {
+        for name in ["ops.example", "192.0.2.7", "[2001:db8::1]"] {
+            check_host(name).unwrap();
+        }
+        for wrong in ["", "ops.example:8443", "https://ops.example", "2001:db8::1", "ops.example/"] {
+            assert!(check_host(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Calls to the services of a flying mission, one after the other, on a thread of their own.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use swath_msgs::RosService;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::{Client, Node, RosError, Shutdown, graph};
+use swath_ros::{Client, Node, Shutdown, graph};
 use tokio::sync::oneshot;
 
 /// How long an answer may take.
@@ -70,13 +70,7 @@ pub fn call<S: RosService>(client: &Client<S>, request: &S::Request) -> Result<S
     if !client.matched() {
         return Err(anyhow!("nobody serves {}", client.service()));
     }
-    let deadline = Instant::now() + TIMEOUT;
-    loop {
-        match client.call(request.clone(), ONE_TRY) {
-            Err(RosError::NoAnswer { .. }) if Instant::now() < deadline => {}
-            answer => return Ok(answer?),
-        }
-    }
+    Ok(client.call_repeatedly(request.clone(), ONE_TRY, TIMEOUT)?)
 }
 
 /// Calls a service once, after `harmless` has been answered.

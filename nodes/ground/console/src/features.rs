@@ -54,7 +54,7 @@ const JSON: &str = "application/json";
 const GEOJSON: &str = "application/geo+json";
 
 /// The landing page.
-#[utoipa::path(get, path = "/", tag = "features", responses((status = 200, body = Value), Problem))]
+#[utoipa::path(get, path = "/", tag = "features", responses((status = 200, description = "as asked", body = Value), Problem))]
 async fn landing(State(server): Home, headers: HeaderMap) -> Json<Value> {
     let base = base(&server, &headers);
     let description = base.replace("/features", "/api/openapi.json");
@@ -71,7 +71,7 @@ async fn landing(State(server): Home, headers: HeaderMap) -> Json<Value> {
 }
 
 /// What the API conforms to.
-#[utoipa::path(get, path = "/conformance", tag = "features", responses((status = 200, body = Value), Problem))]
+#[utoipa::path(get, path = "/conformance", tag = "features", responses((status = 200, description = "as asked", body = Value), Problem))]
 async fn conformance() -> Json<Value> {
     Json(json!({ "conformsTo": CONFORMANCE }))
 }
@@ -92,7 +92,7 @@ fn strips(base: &str) -> Value {
 const CRS: &str = "http://www.opengis.net/def/crs/OGC/1.3/CRS84";
 
 /// The collections.
-#[utoipa::path(get, path = "/collections", tag = "features", responses((status = 200, body = Value), Problem))]
+#[utoipa::path(get, path = "/collections", tag = "features", responses((status = 200, description = "as asked", body = Value), Problem))]
 async fn collections(State(server): Home, headers: HeaderMap) -> Json<Value> {
     let base = base(&server, &headers);
     let links = [link("self", format!("{base}/collections"), JSON)];
@@ -105,7 +105,7 @@ fn known(collection: &str) -> Result<(), Problem> {
 
 /// A collection.
 #[utoipa::path(get, path = "/collections/{collection}", tag = "features",
-    params(("collection" = String, Path, example = "strips")), responses((status = 200, body = Value), Problem))]
+    params(("collection" = String, Path, example = "strips")), responses((status = 200, description = "as asked", body = Value), Problem))]
 async fn collection(State(server): Home, headers: HeaderMap, Named(id): Named<String>) -> Result<Json<Value>, Problem> {
     known(&id)?;
     Ok(Json(strips(&base(&server, &headers))))
@@ -237,7 +237,7 @@ fn feature(status: &msg::StripStatus) -> Value {
 /// Strips, page by page.
 #[utoipa::path(get, path = "/collections/{collection}/items", tag = "features",
     params(("collection" = String, Path, example = "strips"), Which),
-    responses((status = 200, body = Features, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Features, content_type = "application/geo+json"), Problem))]
 async fn items(
     State(server): Home,
     headers: HeaderMap,
@@ -279,7 +279,7 @@ fn escaped(text: &str) -> String {
 /// A strip.
 #[utoipa::path(get, path = "/collections/{collection}/items/{item}", tag = "features",
     params(("collection" = String, Path, example = "strips"), ("item" = String, Path)),
-    responses((status = 200, body = Value, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Value, content_type = "application/geo+json"), Problem))]
 async fn item(
     State(server): Home,
     headers: HeaderMap,

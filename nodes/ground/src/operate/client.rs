@@ -1,10 +1,10 @@
 //! Calls to the nodes of a flying mission.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use swath_msgs::RosService;
-use swath_ros::{Node, RosArgs, RosError, graph};
+use swath_ros::{Node, RosArgs, graph};
 
 /// How long to wait for a node to be there, and for an answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -59,13 +59,7 @@ impl<S: RosService> Desk<S> {
     /// # Errors
     /// When no answer comes in time.
     pub fn call(&self, request: S::Request) -> Result<S::Response> {
-        let deadline = Instant::now() + TIMEOUT;
-        loop {
-            match self.client.call(request.clone(), ONE_TRY) {
-                Err(RosError::NoAnswer { .. }) if Instant::now() < deadline => {}
-                answer => return Ok(answer?),
-            }
-        }
+        Ok(self.client.call_repeatedly(request, ONE_TRY, TIMEOUT)?)
     }
 
     /// Calls it once, after `harmless` has been answered.

@@ -31,9 +31,32 @@ pub struct OrdersArgs {
     json: bool,
 }
 
+/// Orders by their numbers, from the strips of them that are known.
+#[derive(Clone, Debug, Default)]
+pub struct Orders(BTreeMap<u64, Whole>);
+
+impl Orders {
+    /// Adds a strip to its order; strips come in the order of their numbers.
+    pub fn add(&mut self, status: &msg::StripStatus) {
+        self.0.entry(status.order_id).or_default().add(status);
+    }
+
+    /// How many strips there are, and what share of their worth is imaged.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let strips: usize = self.0.values().map(|whole| whole.parts.len()).sum();
+        let (worth, imaged) = self.0.values().fold((0.0, 0.0), |sum, whole| {
+            let worth = whole.worth();
+            (sum.0 + worth, sum.1 + whole.priority() * whole.imaged())
+        });
+        let share = if worth > 0.0 { 100.0 * imaged / worth } else { 0.0 };
+        format!("{strips} strips, {share:.1} % of what they show is imaged")
+    }
+}
+
 /// An order, from the strips of it that are known.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Whole {
+struct Whole {
     number: u64,
     submitter: String,
     reference: String,
@@ -46,9 +69,9 @@ pub struct Whole {
 }
 
 impl Whole {
-    /// Adds a strip of the order; strips come in the order of their numbers. Of two directions of a strip, and of a strip
-    /// that was asked for again, the one that was imaged counts, else the last one.
-    pub fn add(&mut self, status: &msg::StripStatus) {
+    /// Of two directions of a strip, and of a strip that was asked for again, the one that was imaged counts, else the
+    /// last one.
+    fn add(&mut self, status: &msg::StripStatus) {
         if self.parts.is_empty() {
             let alone = status.parts == 0;
             self.number = status.order_id;
@@ -68,17 +91,19 @@ impl Whole {
     }
 
     /// Share of its worth that is imaged [1].
-    #[must_use]
-    pub fn imaged(&self) -> f64 {
+    fn imaged(&self) -> f64 {
         self.parts.values().filter(|(state, ..)| is_imaged(*state)).map(|(_, share, _)| share).sum()
     }
 
+    /// Sum of the priorities of the strips that are known [1].
+    fn worth(&self) -> f64 {
+        self.parts.values().map(|(_, _, priority)| priority).sum()
+    }
+
     /// Its priority: what imaging all of it is worth [1].
-    #[must_use]
-    pub fn priority(&self) -> f64 {
-        let (share, priority) =
-            self.parts.values().fold((0.0, 0.0), |sum, (_, share, priority)| (sum.0 + share, sum.1 + priority));
-        if share > 0.0 { priority / share } else { 0.0 }
+    fn priority(&self) -> f64 {
+        let share: f64 = self.parts.values().map(|(_, share, _)| share).sum();
+        if share > 0.0 { self.worth() / share } else { 0.0 }
     }
 
     fn states(&self) -> BTreeMap<u8, usize> {
@@ -125,18 +150,18 @@ fn is_imaged(state: u8) -> bool {
 /// # Errors
 /// When nobody answers, the store cannot be read, a filter is refused, or there is no such order.
 pub fn orders(args: &OrdersArgs, ros: &RosArgs) -> Result<()> {
-    let statuses = match &args.store {
+    let statuses: Vec<_> = match &args.store {
         Some(path) => {
             let statuses = stored(&Store::open_read_only(path)?)?.into_iter().map(|(_, status)| status);
             statuses.filter(|status| args.common.holds(status)).collect()
         }
         None => pages(&Operator::start(ros)?, &args.common)?,
     };
-    let mut wholes: BTreeMap<u64, Whole> = BTreeMap::new();
-    for status in statuses {
-        wholes.entry(status.order_id).or_default().add(&status);
+    let mut orders = Orders::default();
+    for status in &statuses {
+        orders.add(status);
     }
-    if wholes.is_empty() && args.common.is_one_order() {
+    if orders.0.is_empty() && args.common.is_one_order() {
         bail!("there is no such order");
     }
     if !args.json {
@@ -148,7 +173,7 @@ pub fn orders(args: &OrdersArgs, ros: &RosArgs) -> Result<()> {
             return Ok(());
         }
     }
-    for whole in wholes.values() {
+    for whole in orders.0.values() {
         let line = if args.json { whole.json().to_string() } else { whole.line() };
         if !out::print_line(line)? {
             break;
@@ -193,5 +218,13 @@ mod tests {
         assert_eq!(whole.json()["states"], json!({"completed": 1, "accepted": 1}));
         whole.add(&strip(10, 2, State::Completed, 0));
         assert_eq!((whole.imaged(), whole.reward), (1.0, 0.8));
+    }
+
+    #[test]
+    fn what_is_served_by_the_imaging_of_another_request_is_imaged() {
+        let mut orders = Orders::default();
+        orders.add(&strip(3, 1, State::FulfilledByLink, 0));
+        orders.add(&strip(4, 2, State::Accepted, 0));
+        assert_eq!(orders.summary(), "2 strips, 50.0 % of what they show is imaged");
     }
 }

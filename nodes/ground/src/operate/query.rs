@@ -11,10 +11,10 @@ use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files};
+use super::orders::Orders;
 use super::selection::Common;
 use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
 use crate::requests::json::status_json;
-use swath_mission::requests::lifecycle::State;
 use swath_mission::time_text;
 use swath_node::orders::request_message;
 use swath_node::out;
@@ -144,7 +144,7 @@ pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
         ..args.common.call()
     };
     let mut left = if args.limit == 0 { usize::MAX } else { args.limit as usize };
-    let mut order = Standing::default();
+    let mut orders = Orders::default();
     let mut listening = args.json || out::print_line(status_head())?;
     loop {
         let page = desk.call(call.clone())?;
@@ -154,7 +154,7 @@ pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
         for status in meant.into_iter().take(left) {
             let line = || if args.json { status_json(status).to_string() } else { status_line(status) };
             listening = listening && out::print_line(line())?;
-            order.add(status);
+            orders.add(status);
             left -= 1;
             call.after_id = status.strip.id;
         }
@@ -169,35 +169,9 @@ pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
         }
     }
     if args.common.is_one_order() && !args.json {
-        out::print_line(order.text())?;
+        out::print_line(orders.summary())?;
     }
     Ok(())
-}
-
-/// How far the strips of one order are.
-#[derive(Default)]
-struct Standing {
-    strips: usize,
-    worth: f64,
-    imaged: f64,
-}
-
-impl Standing {
-    fn add(&mut self, status: &msg::StripStatus) {
-        // Of two directions of a strip, the second one is the same strip again.
-        if status.linked_to == 0 || status.linked_to > status.strip.id {
-            self.strips += 1;
-            self.worth += status.strip.priority;
-        }
-        if status.state == State::Completed.number() {
-            self.imaged += status.strip.priority;
-        }
-    }
-
-    fn text(&self) -> String {
-        let share = if self.worth > 0.0 { 100.0 * self.imaged / self.worth } else { 0.0 };
-        format!("{} strips, {share:.1} % of what they show is imaged", self.strips)
-    }
 }
 
 /// Shows all that is known of a strip.

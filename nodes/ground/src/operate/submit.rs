@@ -233,7 +233,7 @@ pub fn replace(args: &ReplaceArgs, ros: &RosArgs) -> Result<()> {
         }
     }
     if refused > 0 {
-        bail!("{refused} strips were refused: they stay as they were");
+        bail!("{refused} strips were refused");
     }
     Ok(())
 }

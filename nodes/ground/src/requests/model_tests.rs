@@ -104,7 +104,9 @@ impl Simpler {
 
     /// The number of a request under a reference, or a new one, or a refusal.
     fn submit(&mut self, reference: u8, place: u8, hold: bool, instead: Option<usize>) -> Option<usize> {
-        if let Some(known) = self.newest(reference).filter(|&i| Some(i) != instead) {
+        // What was not imaged and is over may be asked for again.
+        let counts = |i: usize| self.open(i) || self.requests[i].state == State::Completed;
+        if let Some(known) = self.newest(reference).filter(|&i| Some(i) != instead && counts(i)) {
             let it = &self.requests[known];
             return ((it.place, it.hold) == (place, hold)).then_some(known);
         }

@@ -312,7 +312,7 @@ impl Layout {
         if area.is_nan() || area <= 0.0 {
             return None;
         }
-        let step = (area / SAMPLES).sqrt().max(FINEST);
+        let step = out_of_step((area / SAMPLES).sqrt().max(FINEST), swath.width * (1.0 - swath.overlap));
         let index = Rows::new(&arcs, |direction| self.place(direction)[1], self.south, swath.width);
         let (mut all, mut covered, mut twice) = (0.0, 0.0, 0.0);
         let mut shares = vec![0.0; arcs.len()];
@@ -335,6 +335,13 @@ impl Layout {
         let strips = arcs.into_iter().zip(shares).map(|(arc, share)| (arc, share / all)).collect();
         Some(Cover { strips, covered: covered / all, twice: twice / all, area })
     }
+}
+
+/// About the same spacing, with a ratio to the rows' that no small whole numbers make: a lattice in step with the rows
+/// would meet too much or too little of what two of them show.
+fn out_of_step(step: f64, rows: f64) -> f64 {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    if step < rows { rows / ((rows / step).floor() + golden) } else { rows * ((step / rows).floor() + golden) }
 }
 
 /// Whether a strip shows a point.
@@ -443,9 +450,9 @@ mod tests {
     fn looked_at(polygon: &Polygon, cover: &Cover, middle: [f64; 2], radius_km: f64) -> (f64, f64) {
         let (at, mut all, mut once, mut twice) = (direction(middle), 0, 0, 0);
         let far = turned(&at, north(&at), 1.0) * 1.0_f64.sin() + at * 1.0_f64.cos();
-        for i in 0..4000 {
+        for i in 0..16_000 {
             // Fibonacci's spiral fills the cap evenly.
-            let cos = 1.0 - (1.0 - (radius_km / EARTH_KM).cos()) * (f64::from(i) + 0.5) / 4000.0;
+            let cos = 1.0 - (1.0 - (radius_km / EARTH_KM).cos()) * (f64::from(i) + 0.5) / 16_000.0;
             let along = turned(&at, north(&at), 2.399_963 * f64::from(i));
             let point = at * cos + along * (1.0 - cos * cos).max(0.0).sqrt();
             if polygon.iter().filter(|ring| inside(ring, &point, &far)).count() % 2 == 1 {
@@ -526,7 +533,7 @@ mod tests {
             prop_assert!(cover.strips.iter().all(|(arc, _)| (20.0 - 1e-3..=500.0 + 1e-3).contains(&(arc.length * EARTH_KM))));
             prop_assert!(cover.covered > 0.99 && cover.twice < 0.15, "{} {}", cover.covered, cover.twice);
             let (shown, twice) = looked_at(&polygon, &cover, middle, 500.0);
-            prop_assert!((shown - cover.covered).abs() < 0.02 && (twice - cover.twice).abs() < 0.12, "{} {}", shown, twice);
+            prop_assert!((shown - cover.covered).abs() < 0.02 && (twice - cover.twice).abs() < 0.06, "{} {}", shown, twice);
         }
 
         #[test]

@@ -194,6 +194,27 @@ fn a_response_waits_until_its_client_can_hear_it() {
     client.receive(&header);
 }
 
+/// What answers late has answered: who asks again takes the response to what was asked before.
+#[test]
+fn a_late_response_counts_although_the_call_was_made_again() {
+    let trial = Trial::new(45);
+    let manager = trial.start(graph::REQUEST_MANAGER, "").unwrap();
+    let server = manager.server(&graph::SUBMIT_STRIPS).unwrap();
+    let operator = trial.start(graph::OPERATOR, "").unwrap();
+    let client = operator.client(&graph::SUBMIT_STRIPS).unwrap();
+    operator.wait_for_service(&client, PATIENCE).unwrap();
+    let interval = Duration::from_millis(100);
+    std::thread::scope(|scope| {
+        let call = scope.spawn(|| client.call_repeatedly(SubmitStripsRequest::default(), interval, PATIENCE));
+        let (first, _) = eventually(|| server.take().unwrap());
+        let (second, _) = eventually(|| server.take().unwrap());
+        assert!(second != first);
+        let reason = "late".to_owned();
+        server.respond(first, SubmitStripsResponse { reason, ..Default::default() }).unwrap();
+        assert_eq!(call.join().unwrap().unwrap().reason, "late");
+    });
+}
+
 #[test]
 fn a_service_that_nobody_serves_is_named() {
     let trial = Trial::new(5);
@@ -219,7 +240,7 @@ fn parameters_are_read_and_set_from_outside() {
     let list = tool.client::<ListParameters>(&graph::Service::new("spacecraft/list_parameters", &[], &[])).unwrap();
     tool.wait_for_service(&list, PATIENCE).unwrap();
     let names = list.call(ListParametersRequest::default(), PATIENCE).unwrap().result.names;
-    assert_eq!(names, ["epoch", "external", "fleet", "memory_limit_mb", "packet_filter", "pace", "use_sim_time"]);
+    assert_eq!(names, ["epoch", "external", "fleet", "memory_limit_mb", "pace", "packet_filter", "use_sim_time"]);
 
     let set = tool.client::<SetParameters>(&graph::Service::new("spacecraft/set_parameters", &[], &[])).unwrap();
     let get = tool.client::<GetParameters>(&graph::Service::new("spacecraft/get_parameters", &[], &[])).unwrap();

@@ -54,7 +54,7 @@ const REASON_MAX: usize = 1000;
 
 /// Says that alarms have been seen, in every browser.
 #[utoipa::path(post, path = "/api/alarms/acknowledge", tag = "console", request_body = Seen,
-    responses((status = 200, body = Count), Problem))]
+    responses((status = 200, description = "as asked", body = Count), Problem))]
 async fn acknowledge(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -69,7 +69,7 @@ async fn acknowledge(
 
 /// Puts alarms aside for a while: raised again, they do not count until then.
 #[utoipa::path(post, path = "/api/alarms/shelve", tag = "console", request_body = Aside,
-    responses((status = 200, body = Count), Problem))]
+    responses((status = 200, description = "as asked", body = Count), Problem))]
 async fn shelve(
     State(server): Home,
     Extension(caller): Extension<Caller>,

@@ -68,7 +68,7 @@ struct Info {
 }
 
 /// What is shown, and who is looking.
-#[utoipa::path(get, path = "/api/info", tag = "console", responses((status = 200, body = Info), Problem))]
+#[utoipa::path(get, path = "/api/info", tag = "console", responses((status = 200, description = "as asked", body = Info), Problem))]
 async fn info(State(server): Home, Extension(caller): Extension<Caller>) -> Json<Info> {
     let site = &server.site;
     let live = site.counter.is_some();
@@ -104,7 +104,7 @@ struct After {
 
 /// Facts, page by page.
 #[utoipa::path(get, path = "/api/log", tag = "console", params(After),
-    responses((status = 200, body = Vec<serde_json::Value>), Problem))]
+    responses((status = 200, description = "as asked", body = Vec<serde_json::Value>), Problem))]
 async fn log(State(server): Home, Params(After { after }): Params<After>) -> Response {
     let (_, facts) = server.site.shared.batch(after, PAGE);
     ([(CONTENT_TYPE, "application/json")], facts).into_response()
@@ -112,7 +112,7 @@ async fn log(State(server): Home, Params(After { after }): Params<After>) -> Res
 
 /// This description.
 #[utoipa::path(get, path = "/api/openapi.json", tag = "console",
-    responses((status = 200, body = serde_json::Value), Problem))]
+    responses((status = 200, description = "as asked", body = serde_json::Value), Problem))]
 async fn description(State(server): Home) -> Response {
     ([(CONTENT_TYPE, "application/json")], server.description.clone()).into_response()
 }
@@ -127,7 +127,7 @@ struct Login {
 
 /// A token becomes the browser's cookie: events cannot carry another header.
 #[utoipa::path(post, path = "/api/login", tag = "console", request_body = Login,
-    responses((status = 200, body = Done), Problem))]
+    responses((status = 200, description = "as asked", body = Done), Problem))]
 async fn login(State(server): Home, Json(login): Json<Login>) -> Result<Response, Problem> {
     let guard = &server.site.guard;
     let bearer = HeaderValue::try_from(format!("Bearer {}", login.token.trim()))

@@ -50,7 +50,7 @@ struct Verdict {
 
 /// Says what the planner may do by itself.
 #[utoipa::path(post, path = "/api/planner/mode", tag = "console", request_body = NewMode,
-    responses((status = 200, body = Done), Problem))]
+    responses((status = 200, description = "as asked", body = Done), Problem))]
 async fn set_mode(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -68,7 +68,7 @@ async fn set_mode(
 
 /// Approves or rejects what the planner proposes.
 #[utoipa::path(post, path = "/api/planner/review", tag = "console", request_body = Verdict,
-    responses((status = 200, body = Done), Problem))]
+    responses((status = 200, description = "as asked", body = Done), Problem))]
 async fn decide(
     State(server): Home,
     Extension(caller): Extension<Caller>,

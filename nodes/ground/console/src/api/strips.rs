@@ -185,7 +185,7 @@ async fn read(server: &Server, caller: &Caller, submission: &Submission) -> Resu
 
 /// Submits strips; what is wrong costs itself alone.
 #[utoipa::path(post, path = "/api/strips", tag = "console", request_body = Submission,
-    responses((status = 200, body = Vec<Outcome>), Problem))]
+    responses((status = 200, description = "as asked", body = Vec<Outcome>), Problem))]
 async fn submit(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -210,7 +210,7 @@ async fn submit(
 
 /// Says when strips could be imaged, without submitting them.
 #[utoipa::path(post, path = "/api/strips/preview", tag = "console", request_body = Submission,
-    responses((status = 200, body = Vec<Preview>), Problem))]
+    responses((status = 200, description = "as asked", body = Vec<Preview>), Problem))]
 async fn preview(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -239,7 +239,7 @@ fn by_number(ids: &[u64], results: &[msg::SubmitResult]) -> Json<Vec<Outcome>> {
 
 /// Takes requests back.
 #[utoipa::path(post, path = "/api/strips/cancel", tag = "console", request_body = Cancellation,
-    responses((status = 200, body = Vec<Outcome>), Problem))]
+    responses((status = 200, description = "as asked", body = Vec<Outcome>), Problem))]
 async fn cancel(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -251,7 +251,7 @@ async fn cancel(
 
 /// Holds, releases or rejects requests.
 #[utoipa::path(post, path = "/api/strips/review", tag = "console", request_body = Review,
-    responses((status = 200, body = Vec<Outcome>), Problem))]
+    responses((status = 200, description = "as asked", body = Vec<Outcome>), Problem))]
 async fn review(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -269,7 +269,7 @@ async fn review(
 
 /// Replaces a request by another one; the history of both stays together.
 #[utoipa::path(post, path = "/api/strips/{id}/replace", tag = "console", params(("id" = u64, Path)),
-    request_body = Submission, responses((status = 200, body = Outcome), Problem))]
+    request_body = Submission, responses((status = 200, description = "as asked", body = Outcome), Problem))]
 async fn replace(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -286,7 +286,7 @@ async fn replace(
 
 /// All that is known of a request.
 #[utoipa::path(get, path = "/api/strips/{id}", tag = "console", params(("id" = u64, Path)),
-    responses((status = 200, body = Report), Problem))]
+    responses((status = 200, description = "as asked", body = Report), Problem))]
 async fn report(State(server): Home, Named(id): Named<u64>) -> Result<Json<Report>, Problem> {
     let report = wishes::get(server.counter()?, id).await?;
     let attempt = |it: &msg::Attempt| Attempt {

@@ -40,7 +40,7 @@ pub fn routes() -> OpenApiRouter<Arc<Server>> {
 }
 
 /// The landing page.
-#[utoipa::path(get, path = "/", tag = "stapi", responses((status = 200, body = Landing), Problem))]
+#[utoipa::path(get, path = "/", tag = "stapi", responses((status = 200, description = "as asked", body = Landing), Problem))]
 async fn landing(State(server): Home, headers: HeaderMap) -> Json<Landing> {
     let links = Links::of(&server, &headers);
     Json(Landing {
@@ -61,7 +61,7 @@ async fn landing(State(server): Home, headers: HeaderMap) -> Json<Landing> {
 }
 
 /// What the API conforms to.
-#[utoipa::path(get, path = "/conformance", tag = "stapi", responses((status = 200, body = Conformance), Problem))]
+#[utoipa::path(get, path = "/conformance", tag = "stapi", responses((status = 200, description = "as asked", body = Conformance), Problem))]
 async fn conformance() -> Json<Conformance> {
     Json(Conformance { conforms_to: owned(&CONFORMANCE) })
 }
@@ -94,7 +94,7 @@ fn strip_product(links: &Links) -> Product {
 }
 
 /// What can be ordered.
-#[utoipa::path(get, path = "/products", tag = "stapi", responses((status = 200, body = Products), Problem))]
+#[utoipa::path(get, path = "/products", tag = "stapi", responses((status = 200, description = "as asked", body = Products), Problem))]
 async fn products(State(server): Home, headers: HeaderMap) -> Json<Products> {
     let links = Links::of(&server, &headers);
     let all = vec![Link::new("self", links.to("/products"), JSON)];
@@ -103,7 +103,7 @@ async fn products(State(server): Home, headers: HeaderMap) -> Json<Products> {
 
 /// The product.
 #[utoipa::path(get, path = "/products/{product}", tag = "stapi", params(("product" = String, Path, example = "strip")),
-    responses((status = 200, body = Product), Problem))]
+    responses((status = 200, description = "as asked", body = Product), Problem))]
 async fn product(State(server): Home, headers: HeaderMap, Named(id): Named<String>) -> Result<Json<Product>, Problem> {
     known(&id)?;
     Ok(Json(strip_product(&Links::of(&server, &headers))))
@@ -111,7 +111,7 @@ async fn product(State(server): Home, headers: HeaderMap, Named(id): Named<Strin
 
 /// What the product conforms to.
 #[utoipa::path(get, path = "/products/{product}/conformance", tag = "stapi",
-    params(("product" = String, Path, example = "strip")), responses((status = 200, body = Conformance), Problem))]
+    params(("product" = String, Path, example = "strip")), responses((status = 200, description = "as asked", body = Conformance), Problem))]
 async fn product_conformance(Named(id): Named<String>) -> Result<Json<Conformance>, Problem> {
     known(&id)?;
     Ok(Json(Conformance { conforms_to: owned(&PRODUCT_CONFORMANCE) }))
@@ -119,7 +119,7 @@ async fn product_conformance(Named(id): Named<String>) -> Result<Json<Conformanc
 
 /// What opportunities can be filtered by, as JSON Schema.
 #[utoipa::path(get, path = "/products/{product}/queryables", tag = "stapi",
-    params(("product" = String, Path, example = "strip")), responses((status = 200, body = Value), Problem))]
+    params(("product" = String, Path, example = "strip")), responses((status = 200, description = "as asked", body = Value), Problem))]
 async fn queryables(Named(id): Named<String>) -> Result<Json<Value>, Problem> {
     known(&id)?;
     let number = |description: &str| json!({ "type": "number", "description": description });
@@ -139,7 +139,7 @@ async fn queryables(Named(id): Named<String>) -> Result<Json<Value>, Problem> {
 
 /// How an order may be flown, as JSON Schema.
 #[utoipa::path(get, path = "/products/{product}/order-parameters", tag = "stapi",
-    params(("product" = String, Path, example = "strip")), responses((status = 200, body = Value), Problem))]
+    params(("product" = String, Path, example = "strip")), responses((status = 200, description = "as asked", body = Value), Problem))]
 async fn order_parameters(Named(id): Named<String>) -> Result<Json<Value>, Problem> {
     known(&id)?;
     Ok(Json(json!({

@@ -34,7 +34,7 @@ const LIMIT_MAX: u32 = 100;
 /// Looks for opportunities.
 #[utoipa::path(post, path = "/products/{product}/opportunities", tag = "stapi",
     params(("product" = String, Path, example = "strip")), request_body = OpportunityPayload,
-    responses((status = 200, body = Opportunities, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Opportunities, content_type = "application/geo+json"), Problem))]
 async fn search(
     State(server): Home,
     headers: HeaderMap,

@@ -151,7 +151,7 @@ async fn page(server: &Server, asked: Page, path: String, links: &Links) -> Resu
 
 /// Orders, page by page.
 #[utoipa::path(get, path = "/orders", tag = "stapi", params(Page),
-    responses((status = 200, body = Orders, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Orders, content_type = "application/geo+json"), Problem))]
 async fn list_all(
     State(server): Home,
     headers: HeaderMap,
@@ -164,7 +164,7 @@ async fn list_all(
 /// Orders of the product, page by page.
 #[utoipa::path(get, path = "/products/{product}/orders", tag = "stapi",
     params(("product" = String, Path, example = "strip"), Page),
-    responses((status = 200, body = Orders, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Orders, content_type = "application/geo+json"), Problem))]
 async fn list(
     State(server): Home,
     headers: HeaderMap,
@@ -199,7 +199,7 @@ fn feature(payload: &OrderPayload) -> Result<Value, Problem> {
 #[utoipa::path(post, path = "/products/{product}/orders", tag = "stapi",
     params(("product" = String, Path, example = "strip")), request_body = OrderPayload,
     responses(
-        (status = 201, body = Order, content_type = "application/geo+json",
+        (status = 201, description = "as asked", body = Order, content_type = "application/geo+json",
             headers(("Location" = String, description = "where the order is"))),
         Problem))]
 async fn create(
@@ -236,7 +236,7 @@ async fn create(
 
 /// An order.
 #[utoipa::path(get, path = "/orders/{order}", tag = "stapi", params(("order" = String, Path)),
-    responses((status = 200, body = Order, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Order, content_type = "application/geo+json"), Problem))]
 async fn get(State(server): Home, headers: HeaderMap, Named(id): Named<String>) -> Result<GeoJson<Order>, Problem> {
     server.counter()?;
     let ids = groups::one(&server, &id)?;
@@ -245,7 +245,7 @@ async fn get(State(server): Home, headers: HeaderMap, Named(id): Named<String>) 
 
 /// Takes an order back (not in the specification).
 #[utoipa::path(delete, path = "/orders/{order}", tag = "stapi", params(("order" = String, Path), Why),
-    responses((status = 200, body = Order, content_type = "application/geo+json"), Problem))]
+    responses((status = 200, description = "as asked", body = Order, content_type = "application/geo+json"), Problem))]
 async fn cancel(
     State(server): Home,
     Extension(caller): Extension<Caller>,
@@ -266,7 +266,7 @@ async fn cancel(
 
 /// How an order stood, and stands.
 #[utoipa::path(get, path = "/orders/{order}/statuses", tag = "stapi", params(("order" = String, Path)),
-    responses((status = 200, body = Statuses), Problem))]
+    responses((status = 200, description = "as asked", body = Statuses), Problem))]
 async fn statuses(
     State(server): Home,
     headers: HeaderMap,
