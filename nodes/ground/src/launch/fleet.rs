@@ -228,9 +228,11 @@ impl Fleet {
                 });
                 continue;
             }
-            if member.beside {
+            if member.beside && member.running.is_some() {
                 member.watch.sign(now);
-                member.lost &= member.running.is_none();
+                if std::mem::take(&mut member.lost) {
+                    tell(Happened::Back { by_order: std::mem::take(&mut member.by_order) });
+                }
             }
             match member.watch.step(now) {
                 Step::Warn => tell(Happened::Silent(Duration::from_secs_f64(self.config.warn_s))),

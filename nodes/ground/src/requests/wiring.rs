@@ -100,7 +100,7 @@ impl RequestNode {
         } else {
             (path, None)
         };
-        let lock = StoreLock::take(&path)?;
+        let lock = StoreLock::take(&path, base.node.epoch() > 0)?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let logic = take_up(&base, &mut store)?;

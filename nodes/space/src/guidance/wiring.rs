@@ -133,7 +133,8 @@ impl GuidanceNode {
             question: None,
             nobody_plans: planner_lost.into_iter().map(|(it, _)| it).collect(),
             kept: None,
-            health_told: false,
+            // What the one before has told may be over.
+            health_told: base.node.epoch() > 0,
             base,
         })
     }
