@@ -5,6 +5,7 @@ mod bad_input;
 mod bag;
 mod clients;
 mod common;
+mod console;
 mod examples;
 mod habits;
 mod killed;
