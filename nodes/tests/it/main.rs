@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod bag;
+mod bridge;
 mod clients;
 mod common;
 mod console;
