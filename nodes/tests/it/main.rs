@@ -16,4 +16,5 @@ mod peer;
 mod pins;
 mod readme;
 mod recorded;
+mod supervised;
 mod two_satellites;
