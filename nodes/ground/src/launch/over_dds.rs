@@ -56,7 +56,8 @@ pub fn fly(
     let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
-        let words = ["record", "--use-sim-time", "--manifest", &text(mission_file)?, "--output", &text(&bag)?];
+        let (manifest, output) = (text(mission_file)?, text(&bag)?);
+        let words = ["record", "--use-sim-time", "--own-mission-only", "--manifest", &manifest, "--output", &output];
         let words: Vec<String> =
             words.map(str::to_owned).into_iter().chain(manifest_data(mission, &namespace, policies)).collect();
         let words: Vec<String> =
