@@ -5,7 +5,11 @@ mod bad_input;
 mod bag;
 mod clients;
 mod common;
+mod datagrams;
 mod examples;
+#[path = "../../examples/common/flight.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod flight;
 mod habits;
 mod killed;
 mod operators_day;
@@ -14,4 +18,8 @@ mod peer;
 mod pins;
 mod readme;
 mod recorded;
+mod storm;
+#[path = "../../ros/tests/it/stranger.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod stranger;
 mod two_satellites;

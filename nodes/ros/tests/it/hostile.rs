@@ -181,7 +181,7 @@ fn a_node_whose_dds_has_died_starts_it_anew() {
     spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
     let before = states.gid();
     let stranger = Stranger::new(trial.domain, 7);
-    stranger.send_file("03_nackfrag_base0_56B.hex", false);
+    stranger.send_file("03_nackfrag_base0_56B", false);
     let mut renewed = 0;
     eventually(|| {
         spacecraft.check().unwrap();
@@ -211,8 +211,7 @@ fn datagrams_that_would_end_a_node_are_dropped_and_told_of() {
     let received = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
     spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
     let stranger = Stranger::new(trial.domain, 9);
-    let harmful =
-        ["03_nackfrag_base0_56B.hex", "04_heartbeat_long_range_52B.hex", "06_datafrag_4GiB_57B_any_prefix.hex"];
+    let harmful = ["03_nackfrag_base0_56B", "04_heartbeat_long_range_52B", "06_datafrag_4GiB_57B_any_prefix"];
     for file in harmful {
         stranger.send_file(file, false);
         stranger.send_file(file, true);

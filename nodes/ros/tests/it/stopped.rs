@@ -92,12 +92,12 @@ fn guidance_of_little_memory() {
 #[test]
 fn a_process_that_wants_too_much_memory_ends() {
     const SIGABRT: i32 = 6;
-    for (number, file) in [(22, "04_heartbeat_long_range_52B.hex"), (23, "06_datafrag_4GiB_57B_any_prefix.hex")] {
+    for (number, file) in [(22, "04_heartbeat_long_range_52B"), (23, "06_datafrag_4GiB_57B_any_prefix")] {
         let trial = Trial::new(number);
         let watcher = trial.start(graph::PLANNER, "").unwrap();
         let mut guidance = Process::start("stopped::guidance_of_little_memory", &trial);
         eventually(|| watcher.nodes().contains(&trial.full("guidance")).then_some(()));
-        let stranger = Stranger::towards(guidance.0.id(), trial.domain, 8);
+        let stranger = Stranger::towards(Some(guidance.0.id()), trial.domain, 8, 100);
         stranger.send_file(file, false);
         let status = eventually(|| guidance.0.try_wait().unwrap());
         assert_eq!(status.signal(), Some(SIGABRT), "{file}: {status}");
