@@ -1,6 +1,6 @@
 //! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -338,6 +338,13 @@ impl Node {
     #[must_use]
     pub fn nodes(&self) -> BTreeSet<String> {
         self.roster.nodes()
+    }
+
+    /// How often each node of this node's namespace was started anew in its mission, by its name in the namespace, as
+    /// the nodes say of themselves (`epoch`).
+    #[must_use]
+    pub fn epochs(&self) -> BTreeMap<String, u64> {
+        self.roster.epochs()
     }
 
     /// The topic writers of the other processes in the domain.

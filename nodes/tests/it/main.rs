@@ -5,6 +5,7 @@ mod bad_input;
 mod bag;
 mod clients;
 mod common;
+mod console;
 mod datagrams;
 mod examples;
 #[path = "../../examples/common/flight.rs"]

@@ -237,12 +237,12 @@ impl Guidance {
         self.active = Some(active);
         let error = TrackingError { sigma_BR, omega_BR_B };
         if self.wheel_lost && (waits || body.omega_BN_B.norm() > DAMPED_FROM * self.law.omega_max()) {
-            let torque = self.plant.saturate(&self.law.damping(&body.omega_BN_B), &body.wheel_speed);
+            let torque = self.plant.wheels.saturate(&self.law.damping(&body.omega_BN_B), &body.wheel_speed);
             return GuidanceTick { torque, error, sin_elevation, imaging };
         }
         let integral = &mut self.servo_integral;
         let command = self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
-        GuidanceTick { torque: self.plant.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
+        GuidanceTick { torque: self.plant.wheels.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
     }
 
     /// σ_BR and the sine of the elevation while following a strip.
