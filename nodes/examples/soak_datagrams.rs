@@ -24,8 +24,8 @@ use storm::Storm;
 
 const DOMAIN: u16 = 148;
 const MISSION: &str = "planner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";
-/// Orbits and paces of the two kinds of missions: twenty seconds each.
-const KINDS: [(&str, &str, &str); 2] = [("lockstep", "30", "0"), ("paced", "2", "500")];
+/// Orbits and paces of the two kinds of missions: half a minute each under a storm.
+const KINDS: [(&str, &str, &str); 2] = [("lockstep", "12", "0"), ("paced", "1.5", "500")];
 const DATAGRAMS: u64 = 5000;
 
 fn main() -> Result<()> {

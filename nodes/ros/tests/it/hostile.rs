@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use swath_msgs::rmw_dds_common::{Gid, NodeEntitiesInfo, ParticipantEntitiesInfo};
 use swath_msgs::swath_msgs::{RequestSummary, SpacecraftState, SubmitStripsRequest, SubmitStripsResponse};
 use swath_ros::{Cdr, Node, Subscription, Trouble, encode, graph};
 
@@ -164,6 +165,33 @@ fn a_program_of_others_may_take_a_node_s_place_if_that_is_declared() {
     std::thread::sleep(Duration::from_millis(300));
     states.publish(&SpacecraftState { tick: 5, ..Default::default() }).unwrap();
     assert_eq!(received.wait(guidance.signal(), PATIENCE).unwrap().unwrap().tick, 5);
+}
+
+/// Of two that come up together one goes, by the order of their identities; one that is there stays.
+#[test]
+fn a_node_that_takes_the_name_of_one_later_ends_nobody() {
+    let trial = Trial::new(47);
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    // Of CycloneDDS, and of RustDDS; both come before any other identity.
+    for (number, vendor) in [(10, 0x10), (11, 0x12)] {
+        let mut stranger = Stranger::new(trial.domain, number);
+        stranger.announce_writer("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
+        std::thread::sleep(Duration::from_millis(300));
+        let node = NodeEntitiesInfo {
+            node_namespace: trial.namespace.clone(),
+            node_name: "spacecraft".to_owned(),
+            ..Default::default()
+        };
+        let mut data = [0; 16];
+        data[..2].copy_from_slice(&[1, vendor]);
+        let info = ParticipantEntitiesInfo { gid: Gid { data }, node_entities_info_seq: vec![node] };
+        stranger.write(1, encode(&info).unwrap().as_bytes());
+        let notice = eventually(|| spacecraft.notices().into_iter().next());
+        assert_eq!((notice.trouble, notice.topic), (Trouble::Namesake, trial.full("spacecraft")));
+        spacecraft.wait(Duration::ZERO).unwrap();
+    }
+    assert!(trial.start(graph::SPACECRAFT, "").is_err(), "a node of ours does not come up beside it");
 }
 
 /// A panic in RustDDS ends its thread, not the process: without a sign of life it is started anew, and all goes on.
