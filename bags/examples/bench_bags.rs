@@ -137,7 +137,7 @@ fn measure_cyclone(dir: &Path) -> Value {
     result
 }
 
-/// The same bag played to a reader of depth 10 in C, which keeps up.
+/// The same bag played to a reader of depth 10 in C that takes each sample where it comes in: what is missing has not come.
 fn measure_reader_in_c(dir: &Path, bag: &Path) -> Value {
     let Some(program) = reader_in_c(dir) else { return json!({}) };
     let play = |rate: &str| {
