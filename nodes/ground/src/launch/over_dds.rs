@@ -64,9 +64,9 @@ pub fn fly(
     let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
-        let mission = text(mission_file)?;
-        let words = ["record", "--use-sim-time", "--resume", "--manifest", &mission, "--output", &text(&bag)?];
-        let words = words.map(str::to_owned).into_iter().chain(manifest_data);
+        let (manifest, output) = (text(mission_file)?, text(&bag)?);
+        let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
+        let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
         let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words)?;
         fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
