@@ -23,8 +23,11 @@ use thiserror::Error;
 use crate::approval::ApprovalConfig;
 use crate::faults::{FaultPlan, FaultPlanError};
 use crate::orders::cutting::{Cutting, SWATH_KM};
-use crate::orders::import::{Fault, RequestsFileError, import};
+use crate::orders::found::Fault;
+use crate::orders::import::{RequestsFileError, import};
 use crate::orders::order::Order;
+use crate::orders::rows::Rows;
+use crate::orders::short_lines::ShortLines;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
 
@@ -110,15 +113,15 @@ pub struct Mission {
     #[serde(skip_serializing)]
     pub resources: Option<Box<ResourcesConfig>>,
     /// How the satellite that is flown differs from what guidance and planner believe of it.
-    #[serde(skip_serializing_if = "is_exact")]
+    #[serde(skip_serializing_if = "is_default")]
     pub plant: PlantErrors,
     /// What fails on the way.
     #[serde(skip_serializing_if = "FaultPlan::is_empty")]
     pub faults: FaultPlan,
 }
 
-fn is_exact(plant: &PlantErrors) -> bool {
-    *plant == PlantErrors::default()
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Strips known from the start.
@@ -131,6 +134,12 @@ pub struct MissionRequests {
     pub max_attempts: u32,
     /// Width of what the camera shows [km]: lines are followed and areas are covered by strips of it.
     pub swath_km: f64,
+    /// Direction of the strips of areas: `fewest`, `passes`, or a heading in degrees as text.
+    #[serde(skip_serializing_if = "is_default")]
+    pub rows: Rows,
+    /// What becomes of lines that are shorter than a strip may be: `refuse`, `stretch` or `join`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub short_lines: ShortLines,
     /// Random strips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub random: Option<ScenarioConfig>,
@@ -138,7 +147,14 @@ pub struct MissionRequests {
 
 impl Default for MissionRequests {
     fn default() -> Self {
-        Self { files: Vec::new(), max_attempts: 10, swath_km: SWATH_KM, random: None }
+        Self {
+            files: Vec::new(),
+            max_attempts: 10,
+            swath_km: SWATH_KM,
+            rows: Rows::default(),
+            short_lines: ShortLines::default(),
+            random: None,
+        }
     }
 }
 
@@ -303,8 +319,8 @@ impl Mission {
     /// How lines and areas become strips.
     #[must_use]
     pub fn cutting(&self) -> Cutting {
-        let swath_km = self.requests.swath_km;
-        Cutting { swath_km, tolerance_km: 0.5 * swath_km, ..Cutting::of(&self.sim) }
+        let MissionRequests { swath_km, rows, short_lines, .. } = self.requests;
+        Cutting { swath_km, tolerance_km: 0.5 * swath_km, rows, short_lines, ..Cutting::of(&self.sim) }
     }
 
     /// The strips known from the start: those of the files, in order, then the random ones; and what in the files is no

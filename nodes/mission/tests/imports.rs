@@ -5,9 +5,11 @@ use std::path::Path;
 
 use rand::{RngExt as _, SeedableRng as _};
 use swath_mission::orders::cutting::Cutting;
-use swath_mission::orders::formats;
-use swath_mission::orders::import::{Import, Shown, import_features};
+use swath_mission::orders::formats::{self, Source};
+use swath_mission::orders::found::{Import, Shown};
+use swath_mission::orders::import::import_features;
 use swath_mission::orders::order::Order;
+use swath_mission::orders::short_lines::ShortLines;
 use swath_sim::config::SimConfig;
 
 const KML: &str = r#"<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document><Folder><Placemark id="k">
@@ -20,7 +22,7 @@ const GEOJSON: &str = r#"{"type":"Feature","properties":{"name":"x"},
 const CSV: &str = "name,start_lat,start_lon,end_lat,end_lon\nx,45,10,46,12\n";
 
 fn try_read(name: &str, bytes: &[u8]) -> Result<Import, String> {
-    let features = formats::read(bytes, Path::new(name)).map_err(|error| error.to_string())?;
+    let features = formats::read(&Source::alone(name, bytes)).map_err(|error| error.to_string())?;
     Ok(import_features(features, Path::new(name), &Cutting::of(&SimConfig::default())))
 }
 
@@ -211,9 +213,9 @@ fn identity_does_not_hang_on_position_or_file_name() {
 #[test]
 fn short_lines_are_stretched_if_that_is_wanted() {
     let text = r#"{"type":"LineString","coordinates":[[10,0],[10.1,0]]}"#;
-    let features = || formats::read(text.as_bytes(), Path::new("short.geojson")).unwrap();
+    let features = || formats::read(&Source::alone("short.geojson", text)).unwrap();
     let cutting = Cutting::of(&SimConfig::default());
-    let import = import_features(features(), Path::new("short.geojson"), &Cutting { stretch: true, ..cutting });
+    let import = import_features(features(), Path::new("short.geojson"), &Cutting { short_lines: ShortLines::Stretch, ..cutting });
     let config = SimConfig::default();
     import.orders[0].request.to_strip(&config.requests, config.earth.radius_m).unwrap();
     let as_it_is = import_features(features(), Path::new("short.geojson"), &cutting);

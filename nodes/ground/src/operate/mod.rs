@@ -37,7 +37,7 @@ enum StripsCommand {
     /// Make strips of the lines and areas of files, without a mission.
     #[command(after_help = "Examples:
   swath strips cover examples/requests/flood.geojson --out strips.geojson
-  ogr2ogr -f GeoJSONSeq /vsistdout/ lakes.gpkg | swath strips cover - --heading-deg 10")]
+  ogr2ogr -f GeoJSONSeq /vsistdout/ lakes.gpkg | swath strips cover - --rows 10")]
     Cover(cover::CoverArgs),
     /// Say when strips of a file, or a known one, could be imaged.
     #[command(after_help = "Example: swath strips preview examples/requests/fires.geojson --hours 6")]
