@@ -21,9 +21,14 @@ use swath_mission::alarms::conditions::{Report, report_all};
 use swath_mission::alarms::{Board, Entry, Key};
 use swath_mission::file::Mission;
 use swath_mission::guarded::{Deciders, Policies, made_instead};
-use swath_mission::outcome::{Summary, SummaryInputs};
+use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
+use crate::requests::orders::{Orders, stored};
+use crate::requests::store::Store;
+
+/// The request manager's store in the output folder.
+const STORE: &str = "requests.sqlite";
 /// How long the recorder and the console may take to come up.
 const START_TIMEOUT: Duration = Duration::from_secs(20);
 /// In lockstep, a mission without a decision for so long has stalled.
@@ -100,9 +105,19 @@ pub fn fly(
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,
+        orders: orders(output).unwrap_or_else(|error| {
+            tracing::warn!("the share imaged of orders is unknown: {error:#}");
+            Vec::new()
+        }),
         resources: None,
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure })
+}
+
+/// What became of orders, from the store that the request manager left.
+fn orders(output: &OutputFolder) -> Result<Vec<OrderOutcome>> {
+    let requests = stored(&Store::open_read_only(&output.path().join(STORE))?)?;
+    Ok(Orders::of(requests.into_iter().map(|(_, status)| status)).outcomes())
 }
 
 /// What the manifest of the bag tells besides the mission.
@@ -142,7 +157,7 @@ fn start_nodes(
         let own = ["--ros-args", "-p", &mission].map(str::to_owned);
         own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
-    let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
+    let store = format!("store:={}", text(&output.path().join(STORE))?);
     fleet.start_and_keep(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
     for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
         fleet.start(name, program, &words(&[]), false)?;

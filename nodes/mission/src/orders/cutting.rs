@@ -223,7 +223,11 @@ impl Cutting {
 /// in one sense, in the order of those places.
 fn in_order(rings: &[Vec<Place>]) -> Vec<Vec<Place>> {
     let ring = |ring: &Vec<Place>| {
-        let mut ring: Vec<Place> = ring.iter().map(|it| wrapped(*it)).collect();
+        let turned = |place: &Place| {
+            let [longitude, latitude] = wrapped(*place);
+            [if longitude > 180.0 { longitude - 360.0 } else { longitude }, latitude]
+        };
+        let mut ring: Vec<Place> = ring.iter().map(turned).collect();
         ring.dedup();
         while ring.len() > 1 && ring.first() == ring.last() {
             ring.pop();
@@ -273,10 +277,13 @@ fn along_parallels_and_meridians(places: Vec<Place>) -> Vec<Place> {
         let at = |k: u32| [first[0] + (last[0] - first[0]) * f64::from(k) / f64::from(count), first[1]];
         return (0..=count).map(at).map(wrapped).collect();
     }
+    if !places.iter().all(is_on_earth) {
+        return places;
+    }
     let mut along = vec![first];
     for two in places.windows(2) {
         let [a, b] = [two[0], two[1]];
-        let opposite = places.iter().all(is_on_earth) && angle(&direction(a), &direction(b)) > ANTIPODAL_ARC;
+        let opposite = angle(&direction(a), &direction(b)) > ANTIPODAL_ARC;
         if opposite && a[0] == b[0] {
             along.push([a[0], f64::midpoint(a[1], b[1])]);
         }

@@ -30,9 +30,8 @@ impl FromStr for Rows {
         match text {
             "fewest" => Ok(Self::Fewest),
             "passes" => Ok(Self::Passes),
-            _ => heading().ok_or_else(|| {
-                format!("`{text}` is neither `fewest`, `passes` nor a heading of -360 to 360 degrees")
-            }),
+            _ => heading()
+                .ok_or_else(|| format!("`{text}` is neither `fewest`, `passes` nor a heading of -360 to 360 degrees")),
         }
     }
 }

@@ -108,9 +108,7 @@ fn meetings(ends: &[Option<Ends>], reach: f64) -> Vec<(f64, usize, usize)> {
             starts.entry(cell(&ends.start)).or_default().push(i);
         }
     }
-    let around = |[x, y, z]: [i64; 3]| {
-        (0..27_i64).map(move |k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1])
-    };
+    let around = |[x, y, z]: [i64; 3]| (0..27_i64).map(move |k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]);
     let mut found = Vec::new();
     for (from, one) in ends.iter().enumerate() {
         let Some(one) = one else { continue };

@@ -7,7 +7,7 @@ use super::cutting::{CutStrip, Cutting, Outline};
 use super::feature::{Feature, Part};
 use super::found::{Cut, Import, Shown};
 use super::geojson::feature_of;
-use super::order::{MISSION, Order, Part as OrderPart};
+use super::order::{MISSION, Order, Part as OrderPart, rounded};
 use crate::shapes::sphere::Place;
 use crate::time_text;
 
@@ -33,9 +33,12 @@ impl Template {
     /// # Errors
     /// When a property cannot be.
     pub(super) fn new(feature: &Feature, fallback: &str, cutting: &Cutting) -> Result<Self, String> {
-        let time = |key: &str| match feature.text(&[key])? {
+        let time = |key: &str, of_day: usize| match feature.text(&[key])?.filter(|text| !text.trim().is_empty()) {
             None => Ok(0),
-            Some(text) => time_text::parse(&text).map_err(|error| format!("`{key}`: {error}")),
+            Some(text) => match time_text::day(&text) {
+                Some(day) => Ok(day[of_day]),
+                None => time_text::parse(&text).map_err(|error| format!("`{key}`: {error}")),
+            },
         };
         let max_attempts = whole(feature, "max_attempts")?;
         let client_ref = feature.text(&["client_ref"])?;
@@ -50,8 +53,8 @@ impl Template {
         };
         let order = Order {
             submitter: feature.text(&["submitter"])?.unwrap_or_else(|| MISSION.to_owned()),
-            valid_from_ns: time("valid_from")?,
-            valid_until_ns: time("valid_until")?,
+            valid_from_ns: time("valid_from", 0)?,
+            valid_until_ns: time("valid_until", 1)?,
             hold_for_approval: feature.flag("hold_for_approval")?,
             max_attempts,
             part: part(feature)?,
@@ -118,7 +121,7 @@ impl Template {
     fn identity(&self, requests: &[StripRequest]) -> String {
         let mut hash = Sha256::new();
         for request in requests {
-            let order = Order { name: String::new(), request: request.clone(), part: None, ..self.order.clone() };
+            let order = Order { name: String::new(), request: rounded(request), part: None, ..self.order.clone() };
             hash.update(feature_of(&order).to_string());
         }
         let digits: String = hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();

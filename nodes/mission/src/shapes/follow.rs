@@ -81,8 +81,10 @@ enum Unfit {
 
 /// Share of the tolerance that is used: what is left is for what the plane distorts.
 const USED: f64 = 0.999;
-/// Halvings with which the end of a part is sought within an edge.
-const HALVINGS: u32 = 20;
+/// How exactly the end of a part is sought within an edge [rad]: 1 m.
+const EXACT: f64 = 1.6e-7;
+/// Most halvings of an edge in that search.
+const HALVINGS_MAX: f64 = 20.0;
 
 /// Follows a line; where two neighbouring points are antipodal, it is followed before and after.
 #[must_use]
@@ -169,8 +171,10 @@ impl Line {
         }
         let mut parts = Vec::new();
         let mut at = At { vertex: 0, share: 0.0 };
+        let mut guess = 1;
         while at < self.last() {
-            let Some(part) = self.furthest(at, limits) else { break };
+            let Some(part) = self.furthest(at, guess, limits) else { break };
+            guess = (part.to.vertex - part.from.vertex).max(1);
             at = part.to;
             parts.push(part);
         }
@@ -180,12 +184,12 @@ impl Line {
         parts.into_iter().map(|part| self.piece(&part, whole, limits)).collect()
     }
 
-    /// The part from a position on that reaches furthest with one strip.
-    fn furthest(&self, from: At, limits: &Limits) -> Option<Part> {
+    /// The part from a position on that reaches furthest with one strip: about so many points far.
+    fn furthest(&self, from: At, guess: usize, limits: &Limits) -> Option<Part> {
         let fits = |to: At| fit(&self.part(from, to), limits).map(|(arc, chord)| (to, arc, chord));
         let vertex = |vertex: usize| At { vertex, share: 0.0 };
         // Twice as far each time, and then back by halves.
-        let (mut good, mut bad, mut step) = (None, None, 1);
+        let (mut good, mut bad, mut step) = (None, None, guess);
         let mut good_vertex = from.vertex;
         while bad.is_none() && good_vertex < self.last().vertex {
             let next = (good_vertex + step).min(self.last().vertex);
@@ -206,7 +210,8 @@ impl Line {
             full = unfit == Unfit::Long;
             let start = if good_vertex == from.vertex { from.share } else { 0.0 };
             let (mut near, mut far) = (start, 1.0);
-            for _ in 0..HALVINGS {
+            let edge = self.lengths[good_vertex + 1] - self.lengths[good_vertex];
+            for _ in 0..(edge / EXACT).log2().ceil().clamp(1.0, HALVINGS_MAX) as u32 {
                 let share = f64::midpoint(near, far);
                 match fits(At { vertex: good_vertex, share }) {
                     Ok(found) => (good, near) = (Some(found), share),
@@ -301,12 +306,14 @@ impl Line {
 fn fit(points: &[Vector3<f64>], limits: &Limits) -> Result<(Arc, bool), Unfit> {
     let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return Err(Unfit::Far) };
     // What is further away than a strip is long is on no strip with the first point.
-    let reach = limits.longest + 2.0 * limits.tolerance;
-    if points.iter().any(|point| angle(&first, point) > reach) {
+    let reach = (limits.longest + 2.0 * limits.tolerance).min(std::f64::consts::PI);
+    let nearest = libm::cos(reach);
+    if points.iter().any(|point| first.dot(point) < nearest) {
         return Err(Unfit::Long);
     }
     let tolerance = limits.tolerance * USED;
     if let Some(arc) = Arc::new(first, last)
+        && points.iter().all(|point| arc.normal().dot(point).abs() <= tolerance)
         && follows(points.iter().map(|point| arc.across_along(point)), arc.length, tolerance)
     {
         return if arc.length <= limits.longest { Ok((arc, true)) } else { Err(Unfit::Long) };

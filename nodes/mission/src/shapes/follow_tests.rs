@@ -120,8 +120,7 @@ fn walks() -> impl Strategy<Value = Vec<Vector3<f64>>> {
     let place = (-180.0..180.0, -90.0..=90.0).prop_map(|(longitude, latitude)| [longitude, latitude]);
     let place = prop_oneof![place, Just([180.0, 0.0]), Just([0.0, 90.0]), Just([-179.9, -89.99])];
     let step = (prop_oneof![0.0..30.0, 100.0..1500.0, Just(0.0)], prop_oneof![-40.0..40.0, -180.0..180.0]);
-    (place, 0.0..360.0, prop::collection::vec(step, 1..60))
-        .prop_map(|(at, heading, steps)| walk(at, heading, &steps))
+    (place, 0.0..360.0, prop::collection::vec(step, 1..60)).prop_map(|(at, heading, steps)| walk(at, heading, &steps))
 }
 
 proptest! {

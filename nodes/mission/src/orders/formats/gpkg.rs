@@ -69,7 +69,8 @@ fn check_crs(database: &Connection, srs: i64) -> Result<(), FormatError> {
         return Ok(());
     }
     let query = "SELECT organization, organization_coordsys_id, srs_name FROM gpkg_spatial_ref_sys WHERE srs_id = ?1";
-    let one = |row: &Row<'_>| -> rusqlite::Result<(String, i64, String)> { Ok((row.get(0)?, row.get(1)?, row.get(2)?)) };
+    let one =
+        |row: &Row<'_>| -> rusqlite::Result<(String, i64, String)> { Ok((row.get(0)?, row.get(1)?, row.get(2)?)) };
     let named = database.query_row(query, [srs], one).optional().unwrap_or_default();
     let (organization, code, name) = named.unwrap_or_else(|| ("srs".to_owned(), srs, "unknown".to_owned()));
     crs::by_code(&format!("{organization}:{code}"))
@@ -77,13 +78,20 @@ fn check_crs(database: &Connection, srs: i64) -> Result<(), FormatError> {
 }
 
 fn read_table(database: &Connection, table: &str, column: &str, features: &mut Features) -> rusqlite::Result<()> {
+    // The names of a statement's columns are believed to be UTF-8; those of this table are values.
+    let mut names = database.prepare("SELECT name FROM pragma_table_info(?1)")?;
+    let names = names.query_map([table], |row| Ok(text(row.get_ref(0)?.as_bytes().unwrap_or_default())))?;
+    let names: Vec<String> = names.collect::<Result<_, _>>()?;
     let mut rows = database.prepare(&format!("SELECT * FROM \"{}\"", table.replace('"', "\"\"")))?;
-    let names: Vec<String> = rows.column_names().into_iter().map(str::to_owned).collect();
     let mut rows = rows.query([])?;
     while let Some(row) = rows.next()? {
         features.push(read_row(row, &names, column));
     }
     Ok(())
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
 }
 
 fn read_row(row: &Row<'_>, names: &[String], geometry: &str) -> Result<Feature, String> {
@@ -94,10 +102,7 @@ fn read_row(row: &Row<'_>, names: &[String], geometry: &str) -> Result<Feature, 
             ValueRef::Blob(blob) if name.eq_ignore_ascii_case(geometry) => feature.parts = parts(blob)?,
             ValueRef::Integer(number) => drop(feature.properties.insert(name.clone(), number.into())),
             ValueRef::Real(number) => drop(feature.properties.insert(name.clone(), number.into())),
-            ValueRef::Text(text) => {
-                let text = String::from_utf8_lossy(text).into_owned();
-                feature.properties.insert(name.clone(), Value::String(text));
-            }
+            ValueRef::Text(bytes) => drop(feature.properties.insert(name.clone(), Value::String(text(bytes)))),
             ValueRef::Null | ValueRef::Blob(_) => {}
         }
     }

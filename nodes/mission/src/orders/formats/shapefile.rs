@@ -1,9 +1,11 @@
 //! Shapefiles (Esri, July 1998): the shapes of a `.shp`, with the rows of the `.dbf` beside it.
 
-use std::io::Cursor;
+use std::io::{Cursor, Read, Seek};
 
 use ::shapefile::dbase::encoding::EncodingRs;
-use ::shapefile::dbase::{FieldValue, Reader, ReaderBuilder, Record, encoding_rs};
+use ::shapefile::dbase::{
+    ErrorKind, FieldError, FieldIterator, FieldValue, NamedValue, ReadableRecord, Reader, ReaderBuilder, encoding_rs,
+};
 use ::shapefile::record::traits::HasXY;
 use ::shapefile::{PolygonRing, ReadableShape as _, Shape};
 use serde_json::{Map, Value};
@@ -30,7 +32,7 @@ pub(super) fn read(source: &Source) -> Result<Features, FormatError> {
     }
     let mut rest = source.bytes.get(HEADER_LENGTH..).unwrap_or_default();
     let mut table = table.as_deref().map(|bytes| Table::new(bytes, &source.beside)).transpose()?;
-    let mut rows = table.as_mut().map(|table| (table.deleted(), table.reader.iter_records()));
+    let mut rows = table.as_mut().map(|table| (table.deleted(), table.reader.iter_records_as::<Row>()));
     let mut features = Vec::new();
     while !rest.is_empty() {
         let mut row = None;
@@ -95,21 +97,35 @@ fn encoding(label: &[u8]) -> Option<&'static encoding_rs::Encoding> {
     encoding_rs::Encoding::for_label(label).or_else(|| encoding_rs::Encoding::for_label(&windows))
 }
 
-fn feature(shape: &[u8], row: Result<Option<Record>, String>) -> Result<Feature, String> {
+fn feature(shape: &[u8], row: Result<Option<Row>, String>) -> Result<Feature, String> {
     let size = i32::try_from(shape.len()).map_err(|error| error.to_string())?;
     let shape = Shape::read_from(&mut Cursor::new(shape), size).map_err(|error| error.to_string())?;
-    let properties = row?.map(properties).unwrap_or_default();
+    let properties = row?.map(|row| row.0).unwrap_or_default();
     Ok(Feature { properties, parts: parts(shape) })
 }
 
-fn properties(row: Record) -> Map<String, Value> {
-    row.into_iter().map(|(name, value)| (full_name(name), property(value))).collect()
+/// The properties of a row.
+struct Row(Map<String, Value>);
+
+impl ReadableRecord for Row {
+    fn read_using<S: Read + Seek, M: Read + Seek>(fields: &mut FieldIterator<'_, S, M>) -> Result<Self, FieldError> {
+        let mut row = Map::new();
+        for field in fields {
+            match field {
+                Ok(NamedValue { name, value }) => drop(row.insert(full_name(name), property(value))),
+                // GDAL writes `00000000` for none.
+                Err(error) if matches!(error.kind(), ErrorKind::InvalidDate(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Self(row))
+    }
 }
 
 /// The property that a cut name, or one in other letters, stands for.
-fn full_name(name: String) -> String {
-    let is_meant = |full: &&&str| full[..full.len().min(NAME_LENGTH)].eq_ignore_ascii_case(&name);
-    PROPERTIES.iter().find(is_meant).map_or(name.clone(), |full| (*full).to_owned())
+fn full_name(name: &str) -> String {
+    let is_meant = |full: &&&str| full[..full.len().min(NAME_LENGTH)].eq_ignore_ascii_case(name);
+    PROPERTIES.iter().find(is_meant).map_or(name, |full| *full).to_owned()
 }
 
 fn property(value: FieldValue) -> Value {
@@ -202,9 +218,8 @@ impl Outer {
 
     fn inside(&self, [x, y]: &Place) -> bool {
         let edges = self.ring.iter().zip(self.ring.iter().cycle().skip(1));
-        let crossed = edges.filter(|(a, b)| {
-            (a[1] > *y) != (b[1] > *y) && *x < a[0] + (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1])
-        });
+        let crossed =
+            edges.filter(|(a, b)| (a[1] > *y) != (b[1] > *y) && *x < a[0] + (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]));
         crossed.count() % 2 == 1
     }
 }

@@ -92,7 +92,11 @@ impl GeomProcessor for Parts {
         if self.in_other > 0 {
             return Ok(());
         }
-        if self.in_area { self.rings.push(line) } else { self.parts.push(Part::Line(line)) }
+        if self.in_area {
+            self.rings.push(line)
+        } else {
+            self.parts.push(Part::Line(line))
+        }
         Ok(())
     }
 
