@@ -5,6 +5,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
+use rand::{RngExt as _, SeedableRng as _};
 use swath_mission::orders::cutting::Cutting;
 use swath_mission::orders::formats::{self, Source};
 use swath_mission::orders::found::Import;
@@ -23,7 +24,7 @@ fn read(name: &str) -> Import {
     import(&path(name), &cutting()).unwrap()
 }
 
-fn damaged(name: &str, damage: impl Fn(&mut Source)) -> Result<Import, String> {
+fn damaged(name: &str, damage: impl FnOnce(&mut Source)) -> Result<Import, String> {
     let bytes = |name: String| std::fs::read(path(&name)).ok();
     let stem = name.split('.').next().unwrap();
     let mut source = Source::alone(name, bytes(name.to_owned()).unwrap());
@@ -110,4 +111,30 @@ fn other_reference_systems_are_refused_by_name_in_every_format() {
         it.bytes[at..at + 4].copy_from_slice(&32_632_i32.to_le_bytes());
     });
     assert!(error.unwrap_err().starts_with("is in EPSG:32632: convert it"));
+}
+
+#[test]
+fn damaged_files_are_refused_or_read_and_nothing_panics() {
+    let mut rng = rand::rngs::StdRng::seed_from_u64(7);
+    let mut whole = 0;
+    for name in ["lines.shp", "lines.fgb", "lines.gpkg", "areas.shp", "areas.fgb", "areas.gpkg"] {
+        for _ in 0..500 {
+            let changes = rng.random_range(1..4);
+            let found = damaged(name, |source| {
+                let table = source.beside.table.as_mut().filter(|_| changes == 2);
+                let bytes = table.unwrap_or(&mut source.bytes);
+                for _ in 0..changes {
+                    // Half of the changes in the first bytes, where counts and types stand.
+                    let end = if rng.random_bool(0.5) { 200 } else { bytes.len() };
+                    let at = rng.random_range(0..end.min(bytes.len()));
+                    bytes[at] = rng.random_range(0..=255);
+                }
+                if rng.random_bool(0.1) {
+                    bytes.truncate(rng.random_range(0..bytes.len()));
+                }
+            });
+            whole += usize::from(found.is_ok_and(|import| import.refused.is_empty()));
+        }
+    }
+    assert!(whole > 300, "only {whole} were still whole");
 }

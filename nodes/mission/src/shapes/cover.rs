@@ -68,6 +68,8 @@ const LARGE: f64 = 0.25;
 const HEADINGS: u32 = 18;
 /// Points at which what is shown is counted, about.
 const SAMPLES: f64 = 20_000.0;
+/// Such points across a swath, at least: every strip has to have its share.
+const WITHIN_SWATH: f64 = 3.0;
 /// Least distance of those points [rad]: about 60 m, so that slivers cost no more than other areas.
 const FINEST: f64 = 1e-5;
 /// Most points of an edge that is cut into straight parts.
@@ -333,7 +335,8 @@ impl Layout {
         if area.is_nan() || area <= 0.0 {
             return None;
         }
-        let step = out_of_step((area / SAMPLES).sqrt().max(FINEST), swath.width * (1.0 - swath.overlap));
+        let step = (area / SAMPLES).sqrt().max(FINEST).min(swath.width / WITHIN_SWATH);
+        let step = out_of_step(step, swath.width * (1.0 - swath.overlap));
         let index = Rows::new(&arcs, |direction| self.place(direction)[1], self.south, swath.width);
         let (mut all, mut covered, mut twice) = (0.0, 0.0, 0.0);
         let mut shares = vec![0.0; arcs.len()];
@@ -368,6 +371,10 @@ fn out_of_step(step: f64, rows: f64) -> f64 {
 /// Whether a strip shows a point.
 #[must_use]
 pub fn shows(arc: &Arc, point: &Vector3<f64>, width: f64) -> bool {
+    // A sine is less than its angle: most points are told to be outside without asking for that.
+    if arc.normal().dot(point).abs() > 0.5 * width {
+        return false;
+    }
     let (across, along) = arc.across_along(point);
     across.abs() <= 0.5 * width && (0.0..=arc.length).contains(&along)
 }

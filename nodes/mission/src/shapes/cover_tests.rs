@@ -143,4 +143,29 @@ proptest! {
         prop_assert_eq!(one.strips.len(), other.strips.len());
         prop_assert!((one.covered - other.covered).abs() < 1e-3);
     }
+
+    #[test]
+    fn slivers_and_repeated_points_are_covered_too(
+        (middle, mut radii, hole) in stars(),
+        thin in prop::collection::vec((0_usize..12, 0.02..3.0), 0..8),
+        repeats in 1_usize..4,
+    ) {
+        let count = radii.len();
+        thin.into_iter().for_each(|(i, radius)| radii[i % count] = radius);
+        let repeated = |ring: Vec<Vector3<f64>>| ring.into_iter().flat_map(|point| vec![point; repeats]).collect();
+        let mut polygon: Polygon = vec![repeated(star(middle, &radii))];
+        polygon.extend(hole.map(|hole| {
+            repeated(star(middle, &radii.iter().map(|radius| radius * hole).collect::<Vec<_>>()))
+        }));
+        let again = cover(std::slice::from_ref(&polygon), &swath());
+        match cover(&[polygon], &swath()) {
+            Ok(cover) => {
+                let within = |(arc, _): &(Arc, f64)| (20.0 - 1e-3..=500.0 + 1e-3).contains(&(arc.length * EARTH_KM));
+                prop_assert!(cover.strips.iter().all(within));
+                prop_assert!(cover.covered > 0.99, "{}", cover.covered);
+                prop_assert_eq!(Ok(cover), again, "the same whenever it is asked for");
+            }
+            Err(error) => prop_assert_eq!(error, CoverError::Empty),
+        }
+    }
 }
