@@ -40,7 +40,7 @@ const ROUTE_GPX: &str =
 fn main() -> Result<ExitCode> {
     let (first, count) = match common::asked()? {
         common::Asked::Plan => {
-            println!("{}", json!({ "seeds": 5_000_000, "chunk": 50_000 }));
+            println!("{}", json!({ "seeds": 5_000_000, "chunk": 5_000 }));
             return Ok(ExitCode::SUCCESS);
         }
         common::Asked::Seeds(first, count) => (first, count),

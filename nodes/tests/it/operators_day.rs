@@ -173,6 +173,18 @@ fn an_operators_day() {
     assert_eq!(shares.iter().map(|it| it.0).collect::<Vec<_>>(), [12, 9, 8], "flood, river, fire: {orders:?}");
     assert!(shares.iter().all(|(_, imaged)| *imaged > 0.999), "{orders:?}");
 
+    let summary: Value =
+        serde_json::from_str(&std::fs::read_to_string(disasters.join("summary.json")).unwrap()).unwrap();
+    let told: Vec<_> = summary["orders"].as_array().unwrap().iter().map(|it| it["imaged"].as_f64().unwrap()).collect();
+    assert_eq!(told, shares.iter().map(|it| it.1).collect::<Vec<_>>());
+    note("report out/disasters-109-1/bag -o disasters.html");
+    let page = folder.path().join("disasters.html");
+    day.swath(&format!("report {} -o {}", disasters.join("bag").display(), page.display()));
+    let page = std::fs::read_to_string(page).unwrap();
+    let (_, table) = page.split_once("<table id=\"orders\">").unwrap();
+    let table = &table[..table.find("</table>").unwrap()];
+    assert_eq!(table.matches("<td>100.0 %</td>").count(), 3, "{table}");
+
     let words = |words: &str| words.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>();
     let (shown, flown): (Vec<_>, Vec<_>) =
         (documented.iter().map(|it| words(it)).collect(), done.iter().map(|it| words(it)).collect());
