@@ -390,6 +390,18 @@ mod tests {
     }
 
     #[test]
+    fn how_lines_and_areas_become_strips_is_a_setting() {
+        let mission = parse("[requests]\nrows = \"passes\"\nshort_lines = \"join\"\nswath_km = 20.0").unwrap();
+        let cutting = mission.cutting();
+        assert_eq!((cutting.rows, cutting.short_lines), (Rows::Passes, ShortLines::Join));
+        assert_eq!((cutting.swath_km, cutting.tolerance_km), (20.0, 10.0));
+        assert_eq!(parse(&toml::to_string(&mission).unwrap()), Ok(mission));
+        let error = parse("[requests]\nrows = \"north\"").unwrap_err();
+        assert!(error.contains("`north` is neither `fewest`, `passes` nor a heading"), "{error}");
+        assert!(parse("[requests]\nshort_lines = \"melt\"").unwrap_err().contains("unknown variant `melt`"));
+    }
+
+    #[test]
     fn faults_name_the_setting_and_the_limit() {
         let error = parse("orbit = 3").unwrap_err();
         assert!(error.contains("unknown field `orbit`"), "{error}");

@@ -108,6 +108,16 @@ fn an_operators_day() {
     assert_eq!(history[..2], ["held", "accepted"], "{report}");
     assert!(history.contains(&"superseded"), "{report}");
 
+    // By what they have in common: several strips need a word more, and one does not.
+    let several = day.refused("strips replace --submitter floods examples/requests/replacement.geojson");
+    assert!(several.contains("strips are meant: --whole-order replaces all of them"), "{several}");
+    let third = folder.path().join("third.geojson");
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/requests/replacement.geojson"));
+    std::fs::write(&third, text.unwrap().replace("closer look", "third look")).unwrap();
+    day.swath(&format!("strips replace --name closer.look {}", third.display()));
+    assert_eq!(day.show(day.id_of("San Andreas, third look"))["status"]["supersedes"], new);
+
     note("planner mode hold");
     day.swath("planner mode hold");
     note("planner mode approve");

@@ -14,7 +14,7 @@ use swath_sim::config::SimConfig;
 
 use super::client::Operator;
 use swath_mission::orders::cutting::Cutting;
-use swath_mission::orders::feature::Part;
+use swath_mission::orders::feature::{Feature, Part};
 use swath_mission::orders::formats::Features;
 use swath_mission::orders::found::{Cut, Import, Shown};
 use swath_mission::orders::import::{features, import_features, write};
@@ -117,11 +117,14 @@ impl Files {
         Ok(Self(files.iter().map(|file| Ok((file.clone(), features(file)?))).collect::<Result<_>>()?))
     }
 
-    /// How many lines and areas there are.
+    /// How many lines and areas there are; the areas of a feature are one.
     #[must_use]
     pub fn shapes(&self) -> usize {
-        let parts = self.0.iter().flat_map(|(_, features)| features.iter().flatten()).flat_map(|it| &it.parts);
-        parts.filter(|part| !matches!(part, Part::Other(_))).count()
+        let of_feature = |feature: &Feature| {
+            let lines = feature.parts.iter().filter(|part| matches!(part, Part::Line(_))).count();
+            lines + usize::from(feature.parts.iter().any(|part| matches!(part, Part::Area(_))))
+        };
+        self.0.iter().flat_map(|(_, features)| features.iter().flatten()).map(of_feature).sum()
     }
 
     /// Makes strips of them; what is no strip is told on stderr.

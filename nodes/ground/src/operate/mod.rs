@@ -54,6 +54,9 @@ enum StripsCommand {
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
     /// Replace a strip, or a whole order, by the line or area of a file.
+    #[command(after_help = "Examples:
+  swath strips replace 1021 examples/requests/replacement.geojson
+  swath strips replace --ref mekong --submitter relief --whole-order examples/requests/river.gpx")]
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),
