@@ -26,9 +26,11 @@ use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
+use swath_node::stamp::Stamper;
 use swath_ros::RosArgs;
 
 use crate::place::Place;
+use crate::requests::orders::outcomes;
 
 /// `swath launch`.
 #[derive(Debug, Args)]
@@ -216,6 +218,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         wall_seconds: started.elapsed().as_secs_f64(),
         requests: requested as u64,
         accepted: accepted as u64,
+        orders: outcomes(&Stamper::new(mission.epoch_unix_s, period), flight.requests()),
         resources: flight.resources(),
         ..SummaryInputs::default()
     };
