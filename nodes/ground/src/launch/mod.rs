@@ -111,6 +111,9 @@ const NOT_AS_ASKED: u8 = 3;
 /// then is in the outputs; where nothing was, there are none.
 pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
+    if mission.link.is_some() {
+        bail!("a mission with [link] cannot be flown yet: leave it out, and the ground is always connected");
+    }
     if args.in_process {
         mission.faults.fits_one_process()?;
     } else {
