@@ -7,8 +7,6 @@ use swath_sim::error::SimError;
 use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
-use crate::approval::Mode;
-
 /// When the radio can be heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -43,12 +41,10 @@ pub struct LinkConfig {
     pub loss: f64,
     /// Data of an imaged strip [bit]; 0 for images that need not come down.
     pub strip_bits: f64,
-    /// Simulated time without a frame from the ground after which the satellite is in `command_loss_mode` [h]; never
-    /// without it.
+    /// Simulated time without a frame from the ground after which the satellite holds its attitude and images nothing,
+    /// until it hears one [h]; it never does without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command_loss_h: Option<f64>,
-    /// What the planner may do by itself then, until the ground says otherwise.
-    pub command_loss_mode: Mode,
 }
 
 impl Default for LinkConfig {
@@ -64,7 +60,6 @@ impl Default for LinkConfig {
             loss: 0.0,
             strip_bits: 200e6,
             command_loss_h: None,
-            command_loss_mode: Mode::Hold,
         }
     }
 }
@@ -103,9 +98,6 @@ pub enum LinkConfigError {
         "mode is \"passes\", but stations and own_stations are empty: name at least one station, or set mode to \"always\""
     )]
     NoStations,
-    /// Nobody could approve.
-    #[error("command_loss_mode is \"approve\", but without contact nobody can approve")]
-    NobodyApproves,
     /// Two settings for one thing.
     #[error(
         "strip_bits is {0}, but with [resources] images come down as the imager and the transmitter there say: \
@@ -164,9 +156,6 @@ impl LinkConfig {
         if stations.is_empty() && self.mode == LinkMode::Passes {
             return Err(LinkConfigError::NoStations);
         }
-        if self.command_loss_mode == Mode::Approve {
-            return Err(LinkConfigError::NobodyApproves);
-        }
         if sim.resources.is_some() && self.strip_bits > 0.0 {
             return Err(LinkConfigError::TwoImages(self.strip_bits));
         }
@@ -198,7 +187,6 @@ mod tests {
             ("stations = [\"tokyo\"]\nloss = 1.0", "loss is 1, outside 0 to 0.99"),
             ("stations = [\"tokyo\"]\ncommand_loss_h = 0", "command_loss_h is 0, outside 0.01 to 100000"),
             ("", "mode is \"passes\", but stations and own_stations are empty"),
-            ("mode = \"always\"\ncommand_loss_mode = \"approve\"", "command_loss_mode is \"approve\", but"),
         ] {
             assert!(refused(text).starts_with(wanted), "{text}: {}", refused(text));
         }

@@ -1,4 +1,13 @@
 //! The radio between ground and satellite: stations and passes, the protocol, what each end keeps.
 
 pub mod config;
+pub mod end;
+pub mod frame;
+mod inbox;
+pub mod message;
+mod outbox;
 pub mod passes;
+pub mod radio;
+
+#[cfg(test)]
+mod end_tests;

@@ -40,19 +40,23 @@ pub fn passes(stations: &[Station], model: &Model, orbit: &Orbit, (from, to): (T
 
 fn pass(station: &Station, contact: &Contact, model: &Model, orbit: &Orbit) -> Pass {
     let site = model.config.earth.radius_m + station.altitude_m;
-    let range_km = |elevation: f64| range_m(site, orbit.radius, elevation) / 1e3;
     Pass {
         station: station.name.clone(),
         rise_tick: contact.rise,
         set_tick: contact.set,
         duration_s: contact.ticks() as f64 * model.period.seconds(),
         elevation_max_deg: contact.elevation_max.to_degrees(),
-        range_min_km: range_km(contact.elevation_max),
-        range_mask_km: station
-            .range_max_m
-            .map_or(f64::INFINITY, |max| max / 1e3)
-            .min(range_km(station.mask_deg.to_radians())),
+        range_min_km: range_m(site, orbit.radius, contact.elevation_max) / 1e3,
+        range_mask_km: range_mask_m(station, model, orbit) / 1e3,
     }
+}
+
+/// Distance at which a station hears the satellite at most [m].
+#[must_use]
+pub fn range_mask_m(station: &Station, model: &Model, orbit: &Orbit) -> f64 {
+    let site = model.config.earth.radius_m + station.altitude_m;
+    let by_mask = range_m(site, orbit.radius, station.mask_deg.to_radians());
+    station.range_max_m.map_or(by_mask, |max| max.min(by_mask))
 }
 
 /// Distance [m] to a satellite at a radius [m] that is seen at an elevation [rad] from a site at a radius [m]: the law
