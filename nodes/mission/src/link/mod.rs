@@ -1,8 +1,11 @@
 //! The radio between ground and satellite: stations and passes, the protocol, what each end keeps.
 
+pub mod apart;
+pub mod catalogue;
 pub mod config;
 pub mod end;
 pub mod frame;
+pub mod ground;
 mod inbox;
 pub mod message;
 mod outbox;
