@@ -47,7 +47,8 @@ fn assert_settled(flight: &InProcessMission) {
     let (ground, space) = (link.ground().requests(), link.space().requests());
     assert_eq!(ground.len(), space.len(), "each accepted order is on board exactly once, and none is invented");
     assert_eq!(differences(ground, space), Vec::<String>::new());
-    assert_eq!(ground.reward(), space.reward());
+    // Whoever comes back adds them up anew.
+    assert!((ground.reward() - space.reward()).abs() < 1e-9, "{} and {}", ground.reward(), space.reward());
     assert_eq!((link.ground().misread(), link.space().misread()), (0, 0));
 }
 
@@ -107,7 +108,7 @@ fn the_same_mission_twice_is_the_same_to_the_bit() {
 
 #[test]
 fn what_waits_for_a_pass_is_not_imaged_before() {
-    let mission = mission(4.0, 1500, 3, "stations = [\"weilheim\"]");
+    let mission = mission(4.0, 1500, 3, "stations = [\"puertollano\", \"awarua\"]");
     let (tasks, flight) = flown(&mission, Vec::new());
     let link = flight.link().unwrap();
     let rise = link.radio().contacts().all()[0].rise;
@@ -179,7 +180,8 @@ fn changes_in_time_count_and_late_ones_are_answered_so() {
     let link = flight.link().unwrap();
     let ground = link.ground().requests();
     assert_eq!(ground.state(id(20)), Some(State::CancelledByUser));
-    assert_eq!(ground.state(id(21)), Some(State::Held));
+    assert_eq!(ground.state(id(21)), Some(State::Expired));
+    assert!(tasks.iter().all(|it| it.record.strip != Some(id(21))), "what is held is not imaged");
     assert_eq!(ground.state(id(22)), Some(State::Superseded));
     assert_eq!(ground.state(id(4)), Some(State::Completed));
     assert_eq!(ground.state(id(5)), Some(State::Completed));
@@ -199,8 +201,9 @@ fn changes_in_time_count_and_late_ones_are_answered_so() {
 
 #[test]
 fn a_ground_that_is_lost_and_comes_back_loses_and_doubles_nothing() {
-    let link = format!("stations = [{SEVEN}]\nloss = 0.2");
-    let mut mission = mission(8.0, 300, 5, &link);
+    // The orders take more than one pass.
+    let link = format!("stations = [{SEVEN}]\nloss = 0.2\nuplink_bps = 1000");
+    let mut mission = mission(8.0, 1000, 1, &link);
     with_an_end(&mut mission, 6.0);
     let (nominal, _) = flown(&mission, Vec::new());
     // Lost every five minutes, for half a minute each time.
@@ -208,6 +211,7 @@ fn a_ground_that_is_lost_and_comes_back_loses_and_doubles_nothing() {
     mission.faults = toml::from_str(&format!("plan = [{}]", plan.join(", "))).unwrap();
     let (tasks, flight) = flown(&mission, Vec::new());
     assert_settled(&flight);
-    assert_ne!(tasks, nominal, "its absence is felt");
+    assert!(tasks != nominal, "its absence is felt");
+    assert!(tasks.iter().filter(|it| it.record.success()).count() > 20);
     assert!(flight.ways().iter().all(|it| it.acknowledged_tick.is_some()));
 }

@@ -187,7 +187,7 @@ impl End {
         }
         self.counts.heard += 1;
         for (out, received) in self.out.iter_mut().zip(&frame.received) {
-            out.acknowledge(received);
+            out.acknowledge(self.air, received);
         }
         for part in frame.parts {
             self.owes = true;
@@ -209,7 +209,7 @@ impl End {
     pub fn transmit(&mut self, now: Tick) -> Vec<Sent> {
         self.air += 1;
         for out in &mut self.out {
-            out.expire(self.air.saturating_sub(self.rates.patience));
+            out.expire(self.air, self.rates.patience);
         }
         let mut sent = Vec::new();
         while self.debt < self.rates.bits_per_tick {

@@ -11,8 +11,8 @@ enum Stage {
     Waits,
     /// It was sent then [ticks on the air], and may have arrived.
     Sent(u64),
-    /// It has arrived.
-    Arrived,
+    /// The other end said then that it has it [ticks on the air]; it may lose what waits there for an item before it.
+    Arrived(u64),
 }
 
 #[derive(Clone, Debug)]
@@ -79,48 +79,66 @@ impl Outbox {
         self.slots.get_mut(usize::try_from(number.checked_sub(self.base)?).ok()?)
     }
 
-    /// Items that were sent up to `until` [ticks on the air] and are not acknowledged are taken for lost.
-    pub(super) fn expire(&mut self, until: u64) {
+    /// Items of which nothing was heard for `patience` are taken for lost [ticks on the air].
+    pub(super) fn expire(&mut self, now: u64, patience: u64) {
+        let until = now.saturating_sub(patience);
         while let Some((sent, number)) = self.timers.pop_front_if(|(sent, _)| *sent <= until) {
-            let Some(slot) = self.slot(number).filter(|slot| slot.stage == Stage::Sent(sent)) else { continue };
-            slot.stage = Stage::Waits;
-            self.under_way -= slot.item.bits();
+            let Some(slot) = self.slot(number) else { continue };
+            let bits = slot.item.bits();
+            match slot.stage {
+                Stage::Sent(last) if last == sent => self.under_way -= bits,
+                Stage::Arrived(heard) if heard <= until => {}
+                Stage::Arrived(_) => {
+                    self.timers.push_back((now, number));
+                    continue;
+                }
+                Stage::Sent(_) | Stage::Waits => continue,
+            }
+            if let Some(slot) = self.slot(number) {
+                slot.stage = Stage::Waits;
+            }
             self.lost.insert(number);
         }
     }
 
-    /// The other end tells what it has.
-    pub(super) fn acknowledge(&mut self, received: &Received) {
-        let end = self.end();
+    /// The other end tells what it has. What it has handed on is gone from here.
+    pub(super) fn acknowledge(&mut self, now: u64, received: &Received) {
         // An end that was started again hears of what it has not sent since.
-        for number in self.base..received.next.min(end) {
-            self.arrived(number);
+        let end = self.end();
+        while self.base < received.next
+            && let Some(slot) = self.slots.pop_front()
+        {
+            if let Stage::Sent(_) = slot.stage {
+                self.under_way -= slot.item.bits();
+            }
+            self.lost.remove(&self.base);
+            self.base += 1;
         }
+        self.fresh = self.fresh.max(self.base);
         let mut from = received.next;
         for &(missing, there) in &received.beyond {
             from = from.saturating_add(missing);
             let to = from.saturating_add(there);
             for number in from.max(self.base)..to.min(end) {
-                self.arrived(number);
+                self.arrived(now, number);
             }
             from = to;
             if from >= end {
                 break;
             }
         }
-        while self.slots.pop_front_if(|slot| slot.stage == Stage::Arrived).is_some() {
-            self.base += 1;
-        }
-        self.fresh = self.fresh.max(self.base);
     }
 
-    fn arrived(&mut self, number: u64) {
+    fn arrived(&mut self, now: u64, number: u64) {
         let Some(slot) = self.slot(number) else { return };
-        let (stage, bits) = (std::mem::replace(&mut slot.stage, Stage::Arrived), slot.item.bits());
+        let (stage, bits) = (std::mem::replace(&mut slot.stage, Stage::Arrived(now)), slot.item.bits());
         match stage {
             Stage::Sent(_) => self.under_way -= bits,
-            Stage::Waits => _ = self.lost.remove(&number),
-            Stage::Arrived => {}
+            Stage::Waits => {
+                self.lost.remove(&number);
+                self.timers.push_back((now, number));
+            }
+            Stage::Arrived(_) => {}
         }
     }
 
@@ -138,7 +156,7 @@ impl Outbox {
     ) {
         loop {
             let again = self.lost.first().copied();
-            while self.slot(self.fresh).is_some_and(|slot| slot.stage == Stage::Arrived) {
+            while self.slot(self.fresh).is_some_and(|slot| matches!(slot.stage, Stage::Arrived(_))) {
                 self.fresh += 1;
             }
             let fresh = Some(self.fresh).filter(|&it| it < self.end() && self.under_way <= window);
