@@ -16,7 +16,7 @@ use swath_sim::time::Tick;
 
 /// `swath passes`.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  swath passes mission.toml --hours 6\n  \
+#[command(after_help = "Examples:\n  swath passes examples/missions/passes.toml\n  \
     swath passes examples/missions/one_orbit.toml --station weilheim --station santiago --hours 48")]
 pub struct PassesArgs {
     /// Mission file (TOML).

@@ -6,6 +6,7 @@ use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
 use crate::guarded::Deciders;
+use crate::link::response::LinkSummary;
 
 /// One line of `tasks.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -115,6 +116,9 @@ pub struct Summary {
     /// What came to the ground and what was left, in a mission with `[resources]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resources: Option<ResourcesSummary>,
+    /// How long orders took over the radio, in a mission with `[link]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkSummary>,
 }
 
 /// What came to the ground, and how power and data stood at the end.
@@ -155,6 +159,8 @@ pub struct SummaryInputs {
     pub nodes: Vec<NodeProcess>,
     /// What came to the ground and what was left.
     pub resources: Option<ResourcesSummary>,
+    /// How long orders took over the radio.
+    pub link: Option<LinkSummary>,
 }
 
 impl Summary {
@@ -186,6 +192,7 @@ impl Summary {
             messages_recorded: inputs.messages_recorded,
             nodes: inputs.nodes,
             resources: inputs.resources,
+            link: inputs.link,
         }
     }
 
@@ -219,6 +226,7 @@ impl Summary {
                 ("stored at the end", format!("{:.3} Gbit", *stored_bits as f64 / 1e9)),
             ]);
         }
+        rows.extend(self.link.iter().flat_map(LinkSummary::rows));
         let lines = rows.iter().map(|(name, value)| format!("  {name:<20} {value}\n"));
         lines.collect()
     }

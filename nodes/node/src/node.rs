@@ -67,6 +67,9 @@ impl MissionNode {
             bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
         }
         let mission = Mission::read(&path)?;
+        if mission.link.is_some() {
+            bail!("a mission with [link] flies in one process only: swath launch {} --in-process", path.display());
+        }
         let model = Arc::new(mission.model()?);
         let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
         Ok(Self {

@@ -111,15 +111,15 @@ const NOT_AS_ASKED: u8 = 3;
 /// then is in the outputs; where nothing was, there are none.
 pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
     let mission = args.mission()?;
-    if mission.link.is_some() {
-        bail!("a mission with [link] cannot be flown yet: leave it out, and the ground is always connected");
-    }
     if args.in_process {
         mission.faults.fits_one_process()?;
     } else {
         mission.faults.fits_dds()?;
         if mission.sim.resources.is_some() {
             bail!("a mission with [resources] flies in one process only: add --in-process");
+        }
+        if mission.link.is_some() {
+            bail!("a mission with [link] flies in one process only: add --in-process");
         }
     }
     for unseen in mission.stations_never_seen()? {
@@ -200,6 +200,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
     output.write_alarms(&flight.board().take_journal())?;
+    output.write_ways(&flight.ways())?;
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
@@ -212,6 +213,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         requests: requested as u64,
         accepted: accepted as u64,
         resources: flight.resources(),
+        link: flight.link_summary(),
         ..SummaryInputs::default()
     };
     Ok(Flown { summary: Summary::new(inputs, &totals, period), failure })

@@ -101,6 +101,7 @@ pub fn fly(
         messages_recorded,
         nodes,
         resources: None,
+        link: None,
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure })
 }

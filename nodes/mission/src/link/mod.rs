@@ -11,6 +11,7 @@ pub mod message;
 mod outbox;
 pub mod passes;
 pub mod radio;
+pub mod response;
 
 #[cfg(test)]
 mod end_tests;
