@@ -270,7 +270,7 @@ impl<K: RequestKeeper> Mission<K> {
 
     /// Keeps or throws away what was imaged, and counts what came down and what failed in a task.
     fn settle_resources(&mut self, record: &TaskRecord, reward: f64) {
-        let momentum = self.flight.spacecraft.body.wheel_speed.amax() * self.model.plant.wheel_inertia;
+        let momentum = self.flight.spacecraft.body.wheel_speed.amax() * self.model.plant.wheels.inertia;
         let Some(onboard) = self.flight.spacecraft.onboard_mut() else { return };
         if record.strip.is_some() {
             onboard.settle_image(if record.success() { reward } else { 0.0 });

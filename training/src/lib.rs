@@ -57,7 +57,6 @@ pub mod policy;
 pub mod ppo;
 pub mod process;
 pub mod program;
-pub mod report;
 pub mod rollout;
 pub mod stop;
 pub mod store;

@@ -15,10 +15,10 @@ use crate::error::{Result, TrainingError};
 use crate::network::Network;
 use crate::parameters::{Layout, Parameters};
 use crate::ppo::{Aim, Lesson, Ppo, UpdateStatistics};
-use crate::report::Report;
 use crate::rollout::{Actor, Course, Discount, Group, Lead, Segment, Slot, SlotState, Tally};
 use crate::stop::Stop;
 use crate::strips::Strips;
+use crate::tensorboard::scalars::Report;
 use crate::toy::Toy;
 use crate::weights;
 

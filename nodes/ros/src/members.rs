@@ -107,6 +107,19 @@ impl Members {
         (!replaced).then_some(known.identity.node.as_str())
     }
 
+    /// How often each node of this namespace that is there was started, by what it says of itself.
+    pub(crate) fn epochs(&self) -> BTreeMap<String, u64> {
+        let mut epochs = BTreeMap::new();
+        let here = self.heard.values().filter(|known| known.gone.is_none());
+        for Identity { node, epoch, .. } in
+            here.map(|known| &known.identity).filter(|identity| identity.namespace == self.namespace)
+        {
+            let latest = epochs.entry(node.clone()).or_insert(*epoch);
+            *latest = (*epoch).max(*latest);
+        }
+        epochs
+    }
+
     fn is_ours(&self, identity: &Identity) -> bool {
         identity.namespace == self.namespace && identity.fleet == self.fleet
     }
@@ -175,6 +188,7 @@ mod tests {
         members.note([4; 12], identity("planner", "f", 0));
         assert_eq!(members.name_of([3; 12]), Some("planner"));
         assert_eq!(members.name_of([4; 12]), None);
+        assert_eq!(members.epochs(), BTreeMap::from([("planner".to_owned(), 1)]));
         // Another fleet's replaces nobody, and one that repeats itself is not heard later for that.
         members.note([5; 12], identity("planner", "g", 9));
         members.note([1; 12], identity("planner", "f", 0));

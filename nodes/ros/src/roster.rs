@@ -366,6 +366,11 @@ impl Roster {
         lock(&self.state).nodes.values().flatten().map(fully_qualified).collect()
     }
 
+    /// How often each node of our namespace was started.
+    pub(crate) fn epochs(&self) -> BTreeMap<String, u64> {
+        lock(&self.state).members.epochs()
+    }
+
     /// The participant of another process that has a node of our name.
     pub(crate) fn namesake(&self) -> Option<Gid> {
         let name = self.names.fully_qualified();

@@ -3,8 +3,10 @@
 
 mod bad_input;
 mod bag;
+mod bridge;
 mod clients;
 mod common;
+mod console;
 mod examples;
 mod habits;
 mod killed;
@@ -14,4 +16,5 @@ mod peer;
 mod pins;
 mod readme;
 mod recorded;
+mod supervised;
 mod two_satellites;

@@ -266,7 +266,7 @@ impl<'a> Run<'a> {
     }
 
     fn pick_up(&mut self) {
-        self.torque = self.model.plant.saturate(&self.command, &self.body.wheel_speed);
+        self.torque = self.model.plant.wheels.saturate(&self.command, &self.body.wheel_speed);
     }
 
     fn advance(&mut self) {

@@ -126,7 +126,7 @@ impl Frame {
         Self {
             earth: context.model.earth.clone(),
             dcm_HN: hill_dcm(&situation.r_BN_N, &situation.v_BN_N),
-            momentum_B: situation.body.wheel_speed * (context.model.plant.wheel_inertia / MOMENTUM_SCALE),
+            momentum_B: situation.body.wheel_speed * (context.model.plant.wheels.inertia / MOMENTUM_SCALE),
             resources: resources(context),
         }
     }

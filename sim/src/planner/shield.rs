@@ -62,7 +62,7 @@ impl Shield {
     pub fn before(&self, context: &DecisionContext<'_>) -> Option<Decision> {
         let resources = context.situation.resources?;
         let serve = |duty| Decision::Serve { duty, ticks: self.ticks };
-        let momentum = context.situation.body.wheel_speed.amax() * context.model.plant.wheel_inertia;
+        let momentum = context.situation.body.wheel_speed.amax() * context.model.plant.wheels.inertia;
         if self.thrusters && momentum > self.momentum_limit {
             return Some(self.check(context, serve(Duty::Desaturate)));
         }

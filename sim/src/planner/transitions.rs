@@ -55,7 +55,7 @@ impl<'a> Transitions<'a> {
             now: at,
             r_BN_N: self.orbit.position(at),
             v_BN_N: self.orbit.velocity(at),
-            body: BodyState { sigma_BN, omega_BN_B, wheel_speed: wheels / plant.wheel_inertia },
+            body: BodyState { sigma_BN, omega_BN_B, wheel_speed: wheels / plant.wheels.inertia },
             servo_integral: Vector3::zeros(),
             torque_pending: Vector3::zeros(),
             wheels: self.search.begin.wheels,

@@ -107,7 +107,7 @@ impl ControlLaw {
         let rate_error = error.omega_BR_B - omega_star;
         let limit = self.integral_limit;
         *integral = (*integral + rate_error * dt).map(|z| z.clamp(-limit, limit));
-        let momentum = plant.inertia.component_mul(omega_BN_B) + (omega_BN_B + wheel_speed) * plant.wheel_inertia;
+        let momentum = plant.inertia.component_mul(omega_BN_B) + (omega_BN_B + wheel_speed) * plant.wheels.inertia;
         let gyroscopic = (omega_star + omega_RN_B).cross(&momentum);
         let reference = plant.inertia.component_mul(&(omega_star_prime - omega_BN_B.cross(&omega_RN_B)));
         rate_error * self.p + *integral * self.ki - gyroscopic - reference

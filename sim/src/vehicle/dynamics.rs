@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{RAD_S_PER_RPM, SpacecraftConfig};
+use crate::config::SpacecraftConfig;
 use crate::vehicle::mrp;
+use crate::vehicle::wheels::Wheels;
 
 /// Attitude, rate and wheel speeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,13 +44,8 @@ impl Stage {
 pub struct Plant {
     /// Principal inertias, wheels included [kg m²].
     pub inertia: Vector3<f64>,
-    /// Spin inertia of each wheel [kg m²].
-    pub wheel_inertia: f64,
-    /// Torque limit of each wheel [N m].
-    torque_max: Vector3<f64>,
-    wheel_speed_max: f64,
-    /// 1 for a wheel that turns freely, 0 for one whose speed cannot change.
-    free: Vector3<f64>,
+    /// The wheels on its axes.
+    pub wheels: Wheels,
     /// I - Js [kg m²] and its inverse.
     net_inertia: Vector3<f64>,
     net_inertia_inverse: Vector3<f64>,
@@ -62,28 +58,19 @@ impl Plant {
     pub fn new(config: &SpacecraftConfig, dt: f64) -> Self {
         let inertia = Vector3::from(config.inertia_kg_m2);
         let net_inertia = inertia.add_scalar(-config.wheel_inertia_kg_m2);
-        Self {
-            inertia,
-            wheel_inertia: config.wheel_inertia_kg_m2,
-            torque_max: Vector3::repeat(config.wheel_torque_max_nm),
-            free: Vector3::repeat(1.0),
-            wheel_speed_max: config.wheel_speed_max_rpm * RAD_S_PER_RPM,
-            net_inertia,
-            net_inertia_inverse: net_inertia.map(f64::recip),
-            dt,
-        }
+        Self { inertia, wheels: Wheels::new(config), net_inertia, net_inertia_inverse: net_inertia.map(f64::recip), dt }
     }
 
     /// The same with wheels whose torque limit is lower by a share.
     #[must_use]
     pub fn weakened(&self, share: f64) -> Self {
-        Self { torque_max: self.torque_max * (1.0 - share), ..self.clone() }
+        Self { wheels: self.wheels.weakened(share), ..self.clone() }
     }
 
     /// The same with wheels of which each gives only a share of its torque limit.
     #[must_use]
     pub fn limited(&self, shares: &Vector3<f64>) -> Self {
-        Self { torque_max: self.torque_max.component_mul(shares), ..self.clone() }
+        Self { wheels: self.wheels.limited(shares), ..self.clone() }
     }
 
     /// The same with a wheel, 0 to 2, whose speed relative to the body stays what it is. Its axis then has the whole
@@ -91,28 +78,10 @@ impl Plant {
     #[must_use]
     pub fn seized(&self, wheel: usize) -> Self {
         let mut plant = self.clone();
-        plant.torque_max[wheel] = 0.0;
-        plant.free[wheel] = 0.0;
+        plant.wheels.seize(wheel);
         plant.net_inertia[wheel] = plant.inertia[wheel];
         plant.net_inertia_inverse[wheel] = plant.inertia[wheel].recip();
         plant
-    }
-
-    /// Torque limit of each wheel [N m].
-    #[must_use]
-    pub fn torque_max(&self) -> &Vector3<f64> {
-        &self.torque_max
-    }
-
-    /// What the wheels make of a torque command [N m]: clamped to their limit, and nothing that would speed up a wheel
-    /// beyond its speed limit.
-    #[inline]
-    #[must_use]
-    pub fn saturate(&self, command: &Vector3<f64>, wheel_speed: &Vector3<f64>) -> Vector3<f64> {
-        command.zip_zip_map(wheel_speed, &self.torque_max, |torque, speed, max| {
-            let torque = torque.clamp(-max, max);
-            if speed.abs() >= self.wheel_speed_max && torque * speed > 0.0 { 0.0 } else { torque }
-        })
     }
 
     /// Advances the state by one tick under a constant motor torque [N m] on the wheels.
@@ -147,7 +116,7 @@ impl Plant {
         let dt = self.dt;
         let half = 0.5 * dt;
         let (sigma0, omega0) = (state.sigma_BN, state.omega_BN_B);
-        let spin0 = (state.wheel_speed + omega0.component_mul(&self.free)) * self.wheel_inertia;
+        let spin0 = (state.wheel_speed + omega0.component_mul(&self.wheels.free)) * self.wheels.inertia;
         let spin_half = spin0 + torque * half;
         let spin_end = spin0 + torque * dt;
 
@@ -165,7 +134,7 @@ impl Plant {
         let omega = omega0 + (dw1 + (dw2 + dw3) * 2.0 + dw4) * sixth;
         state.sigma_BN = if sigma.norm_squared() > 1.0 { mrp::shadow(&sigma) } else { sigma };
         state.omega_BN_B = omega;
-        state.wheel_speed = spin_end * (1.0 / self.wheel_inertia) - omega.component_mul(&self.free);
+        state.wheel_speed = spin_end * (1.0 / self.wheels.inertia) - omega.component_mul(&self.wheels.free);
     }
 
     /// σ̇ and ω̇; `spin` is the wheels' absolute momentum Js·(Ω+ω) [N m s], Js·Ω of one that is seized; `torque` the wheels'
@@ -186,7 +155,7 @@ impl Plant {
     /// Total angular momentum in N [N m s].
     #[must_use]
     pub fn momentum_N(&self, state: &BodyState) -> Vector3<f64> {
-        let h_B = self.inertia.component_mul(&state.omega_BN_B) + state.wheel_speed * self.wheel_inertia;
+        let h_B = self.inertia.component_mul(&state.omega_BN_B) + state.wheel_speed * self.wheels.inertia;
         mrp::to_dcm(&state.sigma_BN).transpose() * h_B
     }
 
@@ -194,8 +163,8 @@ impl Plant {
     #[must_use]
     pub fn energy(&self, state: &BodyState) -> f64 {
         let w = &state.omega_BN_B;
-        let wheels = (w + state.wheel_speed).norm_squared() * self.wheel_inertia;
-        let body = self.inertia.add_scalar(-self.wheel_inertia);
+        let wheels = (w + state.wheel_speed).norm_squared() * self.wheels.inertia;
+        let body = self.inertia.add_scalar(-self.wheels.inertia);
         0.5 * (w.dot(&body.component_mul(w)) + wheels)
     }
 }
@@ -265,7 +234,7 @@ mod tests {
         for _ in 0..20 {
             plant.step(&mut state, &Vector3::new(0.3, 0.0, 0.0));
         }
-        let net = 82.1 - plant.wheel_inertia;
+        let net = 82.1 - plant.wheels.inertia;
         assert_relative_eq!(state.omega_BN_B.x, -0.3 * 10.0 / net, max_relative = 1e-12);
         // θ = ½·α·t², σ = tan(θ/4).
         assert_relative_eq!(state.sigma_BN.x, libm::tan(-0.5 * 0.3 / net * 100.0 / 4.0), max_relative = 1e-7);
@@ -280,19 +249,11 @@ mod tests {
         let (before, speed) = (plant.momentum_N(&state), state.wheel_speed.y);
         for k in 0..200 {
             let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-            let torque = plant.saturate(&(Vector3::new(0.3, 0.3, -0.2) * sign), &state.wheel_speed);
+            let torque = plant.wheels.saturate(&(Vector3::new(0.3, 0.3, -0.2) * sign), &state.wheel_speed);
             assert_eq!(torque.y, 0.0);
             plant.step(&mut state, &torque);
             assert_relative_eq!(state.wheel_speed.y, speed, max_relative = 1e-12);
         }
         assert_relative_eq!(plant.momentum_N(&state), before, max_relative = 1e-6);
-    }
-
-    #[test]
-    fn a_wheel_at_its_speed_limit_only_takes_torque_that_slows_it() {
-        let plant = Plant::new(&SimConfig::default().spacecraft, 0.5);
-        let speeds = Vector3::new(629.0, -629.0, 629.0);
-        let torque = plant.saturate(&Vector3::new(0.5, 0.5, -0.1), &speeds);
-        assert_eq!(torque, Vector3::new(0.0, 0.3, -0.1));
     }
 }

@@ -27,6 +27,14 @@ pub struct GuidanceTick {
 }
 
 impl GuidanceTick {
+    /// No torque, and nothing that is tracked.
+    pub const IDLE: Self = Self {
+        torque: Vector3::new(0.0, 0.0, 0.0),
+        error: TrackingError { sigma_BR: Vector3::new(0.0, 0.0, 0.0), omega_BR_B: Vector3::new(0.0, 0.0, 0.0) },
+        sin_elevation: 1.0,
+        imaging: false,
+    };
+
     /// Elevation of the satellite seen from the target [rad]; π/2 without one.
     #[must_use]
     pub fn elevation(&self) -> f64 {
@@ -198,8 +206,7 @@ impl Guidance {
     #[inline]
     pub fn tick(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState) -> GuidanceTick {
         let Some(mut active) = self.active.take() else {
-            let error = TrackingError { sigma_BR: Vector3::zeros(), omega_BR_B: Vector3::zeros() };
-            return GuidanceTick { torque: Vector3::zeros(), error, sin_elevation: 1.0, imaging: false };
+            return GuidanceTick::IDLE;
         };
         let mut boresight_B = None;
         let (sigma_BR, sin_elevation, imaging) = match active.task {
@@ -237,12 +244,12 @@ impl Guidance {
         self.active = Some(active);
         let error = TrackingError { sigma_BR, omega_BR_B };
         if self.wheel_lost && (waits || body.omega_BN_B.norm() > DAMPED_FROM * self.law.omega_max()) {
-            let torque = self.plant.saturate(&self.law.damping(&body.omega_BN_B), &body.wheel_speed);
+            let torque = self.plant.wheels.saturate(&self.law.damping(&body.omega_BN_B), &body.wheel_speed);
             return GuidanceTick { torque, error, sin_elevation, imaging };
         }
         let integral = &mut self.servo_integral;
         let command = self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
-        GuidanceTick { torque: self.plant.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
+        GuidanceTick { torque: self.plant.wheels.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
     }
 
     /// σ_BR and the sine of the elevation while following a strip.

@@ -150,6 +150,11 @@ impl Watch {
         std::mem::take(&mut self.changes)
     }
 
+    /// What another watch had come to know before this one was there.
+    pub(super) fn precede_changes(&mut self, changes: Vec<(Tick, Health)>) {
+        self.changes.splice(0..0, changes);
+    }
+
     /// Remembers the torque commanded from the state at a tick [N m].
     pub fn commanded(&mut self, tick: Tick, torque: Vector3<f64>) {
         self.commands = [self.commands[1], Some((tick, torque))];
@@ -198,10 +203,10 @@ impl Watch {
         let acted = self.commands.iter().flatten().find(|(tick, _)| tick.after(1) == last.tick);
         let Some((_, command)) = acted else { return };
         let before = &last.measured;
-        let commanded = self.plant.saturate(command, &before.wheel_speed);
+        let commanded = self.plant.wheels.saturate(command, &before.wheel_speed);
         let spin = |body: &BodyState| body.wheel_speed + body.omega_BN_B;
-        let given = (spin(now) - spin(before)) * (self.plant.wheel_inertia / self.dt);
-        let max = *self.plant.torque_max();
+        let given = (spin(now) - spin(before)) * (self.plant.wheels.inertia / self.dt);
+        let max = self.plant.wheels.torque_max;
         let gave_nothing = |wheel: usize| given[wheel].abs() < LOST * max[wheel];
         if (0..3).all(gave_nothing) {
             return;
@@ -217,7 +222,7 @@ impl Watch {
     fn judge(&mut self, wheel: usize, wanted: f64, share: f64, short: bool) {
         let known = self.health.wheels[wheel];
         // A weak wheel that is asked for no more than it can give tells nothing.
-        let tells = short || wanted > known.max(LOST) * self.plant.torque_max()[wheel] / SHORT;
+        let tells = short || wanted > known.max(LOST) * self.plant.wheels.torque_max[wheel] / SHORT;
         if !tells {
             return;
         }

@@ -13,3 +13,4 @@ pub mod initial;
 pub mod mrp;
 pub mod resources;
 pub mod spacecraft;
+pub mod wheels;

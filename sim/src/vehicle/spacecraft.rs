@@ -178,7 +178,7 @@ impl Spacecraft {
         if self.onboard.is_some() {
             self.live(command, activity);
         } else {
-            self.torque_applied = self.plant.saturate(command, &self.body.wheel_speed);
+            self.torque_applied = self.plant.wheels.saturate(command, &self.body.wheel_speed);
             self.plant.step(&mut self.body, &self.torque_applied);
         }
         self.now = self.now.after(1);
@@ -198,7 +198,7 @@ impl Spacecraft {
         let positions_N = [self.orbit.position(self.now), self.orbit.position(then)];
         let plant = &self.plant;
         let (external, feed_forward) = onboard.torques(self.now, &positions_N, &self.body, plant, activity);
-        self.torque_applied = plant.saturate(&(command + feed_forward), &self.body.wheel_speed);
+        self.torque_applied = plant.wheels.saturate(&(command + feed_forward), &self.body.wheel_speed);
         let torque = &self.torque_applied;
         plant.step_under(&mut self.body, torque, |stage, _| external[stage.index()]);
         onboard.book(then, &positions_N[1], &self.body, plant, torque, activity);

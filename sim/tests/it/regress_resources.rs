@@ -120,7 +120,7 @@ fn a_body_fixed_antenna_sends_in_downlink_tasks_alone() {
 
 #[test]
 fn thrusters_and_rods_take_momentum_out_of_the_wheels() {
-    let of = |flight: &Flight, model: &Model| flight.spacecraft.body.wheel_speed.norm() * model.plant.wheel_inertia;
+    let of = |flight: &Flight, model: &Model| flight.spacecraft.body.wheel_speed.norm() * model.plant.wheels.inertia;
     let thrusters = model(Profile::Bsk, |it| it.disturbance_nm = [0.0; 3]);
     let mut flown = flight(&thrusters, 4);
     let before = of(&flown, &thrusters);
@@ -192,7 +192,7 @@ fn the_shield_keeps_the_battery_above_its_floor_and_sends_and_desaturates() {
                 lowest = lowest.min(env.onboard().unwrap().battery().level());
                 imaged += task.reward;
             }
-            let momentum = env.context().situation.body.wheel_speed.amax() * model.plant.wheel_inertia;
+            let momentum = env.context().situation.body.wheel_speed.amax() * model.plant.wheels.inertia;
             (lowest, imaged, *env.delivered(), momentum)
         };
         let (lowest, imaged, delivered, momentum) = fly(true);

@@ -10,9 +10,9 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
 use swath_training::TrainingError;
-use swath_training::report::Report;
 use swath_training::stop::Stop;
-use swath_training::tensorboard::EventWriter;
+use swath_training::tensorboard::events::EventWriter;
+use swath_training::tensorboard::scalars::Report;
 use swath_training::trainer::Trainer;
 
 use super::output::{bar, say};

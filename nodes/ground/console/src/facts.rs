@@ -1,5 +1,7 @@
 //! What the console tells: facts, one JSON record each, made from the messages of a mission.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::DiagnosticStatus;
@@ -245,6 +247,8 @@ pub enum Fact {
         present: Vec<String>,
         /// Those that are not.
         missing: Vec<String>,
+        /// How often each was started anew; not those that never were.
+        restarts: BTreeMap<String, u64>,
     },
 }
 

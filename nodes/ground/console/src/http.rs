@@ -1,5 +1,6 @@
 //! The port: connections with limits, with or without TLS, each answered by the routes.
 
+use std::convert::Infallible;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -7,7 +8,11 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use axum::Router;
+use axum::http::header::CONTENT_TYPE;
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use rustls::ServerConfig;
@@ -15,11 +20,12 @@ use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::Semaphore;
 use tokio_rustls::TlsAcceptor;
 
+use crate::guests::{Guest, Guests};
 use crate::routes;
 use crate::server::Site;
+use crate::stream;
 
 /// Connections at a time.
 const CONNECTIONS: usize = 256;
@@ -78,18 +84,10 @@ pub fn serve(listener: std::net::TcpListener, tls: Option<Arc<ServerConfig>>, si
 }
 
 async fn accept(listener: &TcpListener, tls: Option<TlsAcceptor>, router: &Router) {
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    let guests = Guests::new(CONNECTIONS);
     loop {
-        // The semaphore is never closed.
-        let Ok(place) = Arc::clone(&places).acquire_owned().await else { return };
         match listener.accept().await {
-            Ok((stream, _)) => {
-                let (tls, router) = (tls.clone(), router.clone());
-                tokio::spawn(async move {
-                    greet(stream, tls, router).await;
-                    drop(place);
-                });
-            }
+            Ok((stream, _)) => guests.welcome(|guest| greet(stream, tls.clone(), router.clone(), guest)).await,
             // Out of file descriptors, for one: others may close theirs.
             Err(error) => {
                 tracing::warn!("a connection was not taken: {error}");
@@ -99,20 +97,36 @@ async fn accept(listener: &TcpListener, tls: Option<TlsAcceptor>, router: &Route
     }
 }
 
-async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router) {
-    let Some(tls) = tls else { return converse(stream, router).await };
+async fn greet(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router, guest: Arc<Guest>) {
+    let Some(tls) = tls else { return converse(stream, router, guest).await };
     match tokio::time::timeout(HEAD_TIME, tls.accept(stream)).await {
-        Ok(Ok(stream)) => converse(stream, router).await,
+        Ok(Ok(stream)) => converse(stream, router, guest).await,
         Ok(Err(error)) => tracing::debug!("a connection without TLS: {error}"),
         Err(_) => tracing::debug!("a connection that did not begin TLS"),
     }
 }
 
-async fn converse<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(stream: S, router: Router) {
+async fn converse<S>(stream: S, router: Router, guest: Arc<Guest>)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let router = TowerToHyperService::new(router);
+    let answer = service_fn(move |request: Request<Incoming>| {
+        guest.busy();
+        let (answer, guest) = (router.call(request), Arc::clone(&guest));
+        async move {
+            let answer = answer.await?;
+            // A stream of events goes on for as long as its reader does.
+            if answer.headers().get(CONTENT_TYPE).is_none_or(|it| it != stream::MEDIA_TYPE) {
+                guest.waits();
+            }
+            Ok::<_, Infallible>(answer)
+        }
+    });
     let conversation = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD_TIME)
-        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+        .serve_connection(TokioIo::new(stream), answer);
     if let Err(error) = conversation.await {
         tracing::debug!("a connection has ended: {error}");
     }

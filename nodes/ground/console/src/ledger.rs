@@ -25,7 +25,7 @@ pub struct Ledger {
     told: BTreeMap<u64, (u8, Time)>,
     alarms: BTreeMap<(String, String), u64>,
     acknowledged: BTreeSet<u64>,
-    present: Option<BTreeSet<String>>,
+    present: Option<Fact>,
     /// How each request stands.
     requests: BTreeMap<u64, msg::StripStatus>,
     tasks: u64,
@@ -300,15 +300,16 @@ impl Ledger {
         true
     }
 
-    /// The nodes that are there, of those that should be; told when it changes.
-    pub fn nodes(&mut self, present: BTreeSet<String>, expected: &[&str]) {
-        let here: BTreeSet<_> = present.into_iter().filter(|name| expected.contains(&name.as_str())).collect();
-        if self.present.as_ref() == Some(&here) {
-            return;
+    /// The nodes that are there, of those that should be, and how often each was started anew; told when it changes.
+    pub fn nodes(&mut self, present: BTreeSet<String>, expected: &[&str], epochs: BTreeMap<String, u64>) {
+        let present: Vec<_> = present.into_iter().filter(|name| expected.contains(&name.as_str())).collect();
+        let missing = expected.iter().map(|name| (*name).to_owned()).filter(|name| !present.contains(name)).collect();
+        let again = epochs.into_iter().filter(|(name, epoch)| *epoch > 0 && expected.contains(&name.as_str()));
+        let nodes = Fact::Nodes { present, missing, restarts: again.collect() };
+        if self.present.as_ref() != Some(&nodes) {
+            self.tell(self.now_ms, &nodes);
+            self.present = Some(nodes);
         }
-        let missing = expected.iter().filter(|name| !here.contains(**name)).map(|name| (*name).to_owned()).collect();
-        self.tell(self.now_ms, &Fact::Nodes { present: here.iter().cloned().collect(), missing });
-        self.present = Some(here);
     }
 }
 
@@ -433,11 +434,17 @@ mod tests {
         let mut ledger = Ledger::default();
         let here = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<BTreeSet<_>>();
         let expected = ["guidance", "planner"];
-        ledger.nodes(here(&["guidance", "planner", "console"]), &expected);
-        ledger.nodes(here(&["guidance", "planner"]), &expected);
-        ledger.nodes(here(&["planner"]), &expected);
-        let missing: Vec<_> = told(&ledger).iter().map(|fact| fact["missing"].clone()).collect();
-        assert_eq!(missing, [json!([]), json!(["guidance"])]);
+        let never = BTreeMap::new;
+        ledger.nodes(here(&["guidance", "planner", "console"]), &expected, never());
+        ledger.nodes(here(&["guidance", "planner"]), &expected, never());
+        ledger.nodes(here(&["planner"]), &expected, never());
+        let epochs = BTreeMap::from([("planner".to_owned(), 0), ("guidance".to_owned(), 1)]);
+        ledger.nodes(here(&["guidance", "planner"]), &expected, epochs);
+        let all = told(&ledger);
+        let missing: Vec<_> = all.iter().map(|fact| fact["missing"].clone()).collect();
+        assert_eq!(missing, [json!([]), json!(["guidance"]), json!([])]);
+        let restarts: Vec<_> = all.iter().map(|fact| fact["restarts"].clone()).collect();
+        assert_eq!(restarts, [json!({}), json!({}), json!({ "guidance": 1 })]);
     }
 
     #[test]

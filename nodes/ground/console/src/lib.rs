@@ -14,6 +14,7 @@ mod extract;
 mod facts;
 mod features;
 mod guard;
+mod guests;
 mod http;
 mod ledger;
 mod live;

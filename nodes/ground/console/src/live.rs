@@ -77,8 +77,8 @@ impl Ear {
         })?;
         if self.looked.is_none_or(|looked| looked.elapsed() >= LOOK) {
             self.looked = Some(Instant::now());
-            let present = members(node);
-            shared.update(|ledger| ledger.nodes(present, &graph::FLIGHT_NODES));
+            let (present, epochs) = (members(node), node.epochs());
+            shared.update(|ledger| ledger.nodes(present, &graph::FLIGHT_NODES, epochs));
         }
         node.wait(IDLE)?;
         Ok(())

@@ -7,6 +7,8 @@ use hyper::body::Bytes;
 
 use crate::shared::Shared;
 
+/// The media type of server-sent events.
+pub const MEDIA_TYPE: &str = "text/event-stream";
 /// Facts of one event.
 const BATCH: usize = 2000;
 /// Between events to a reader that has read everything: ten a second.

@@ -139,7 +139,7 @@ impl ClosedLoop {
         });
         self.last_torques = last;
         self.now = then;
-        self.torque = plant.saturate(&self.command, &self.body.wheel_speed);
+        self.torque = plant.wheels.saturate(&self.command, &self.body.wheel_speed);
         self.look();
     }
 
@@ -155,7 +155,7 @@ impl ClosedLoop {
         self.field_N = field.field_N(&r_BN_N, self.earth.cos_sin(self.now));
         let field_B = mrp::to_dcm(&self.body.sigma_BN) * self.field_N;
         let bias = Vector3::from(torquers.bias_rpm) * RAD_S_PER_RPM;
-        let momentum = (self.body.wheel_speed - bias) * self.model.plant.wheel_inertia;
+        let momentum = (self.body.wheel_speed - bias) * self.model.plant.wheels.inertia;
         self.dipole_B = Rods { gain: torquers.gain, dipole_max: torquers.max_dipole }.dipole(&momentum, &field_B);
         if let Some((_, dipole)) = self.bad_ticks.iter().find(|(tick, _)| *tick == self.now) {
             self.dipole_B = *dipole;

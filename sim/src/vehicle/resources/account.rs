@@ -185,7 +185,7 @@ impl Onboard {
         activity: Activity,
     ) -> ([Vector3<f64>; 3], Vector3<f64>) {
         let (start_N, end_N) = (positions_N[0] * self.inverse_radius, positions_N[1] * self.inverse_radius);
-        let momentum_B = body.wheel_speed * plant.wheel_inertia;
+        let momentum_B = body.wheel_speed * plant.wheels.inertia;
         let field_N = self.field.field_above_N(&start_N, self.field_scale, self.earth.cos_sin(now));
         let mut feed_forward = Vector3::zeros();
         self.state.rod_dipole_B = Vector3::zeros();
@@ -225,7 +225,7 @@ impl Onboard {
         self.state.stored_bits = self.storage.stored();
         self.state.to_send_bits = self.storage.to_send();
         self.state.charge_j = self.battery.charge_j();
-        if body.wheel_speed.amax() * plant.wheel_inertia > self.config.wheel_momentum_max_nms {
+        if body.wheel_speed.amax() * plant.wheels.inertia > self.config.wheel_momentum_max_nms {
             self.state.failure = Some((now, Failure::WheelMomentum));
         }
         if !met {

@@ -90,7 +90,7 @@ async fn facts(State(server): Home, headers: HeaderMap) -> Response {
     let last = headers.get("last-event-id").and_then(|value| value.to_str().ok());
     let place = stream::place(last, &server.run);
     let body = stream::body(server.site.shared.clone(), server.run.clone(), place);
-    ([(CONTENT_TYPE, "text/event-stream")], Body::new(body)).into_response()
+    ([(CONTENT_TYPE, stream::MEDIA_TYPE)], Body::new(body)).into_response()
 }
 
 #[derive(Deserialize, IntoParams)]

@@ -9,18 +9,22 @@ use std::time::Duration;
 use serde_json::Value;
 use swath_console::{ASSETS, Guard, Shared, Site, listen, read_bag, serve};
 
+/// The sample mission behind a guard.
+pub fn recorded(guard: Guard) -> Site {
+    let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../bags/samples/mission");
+    let shared = Shared::default();
+    let recording = shared.update(|ledger| read_bag(&bag, "/swath", ledger)).unwrap();
+    let (title, elevation_min_deg) = (recording.title, recording.elevation_min_deg);
+    Site { shared, counter: None, title, elevation_min_deg, guard }
+}
+
 /// The sample mission, served for all tests of this binary.
 pub fn replay() -> SocketAddr {
     static ADDRESS: OnceLock<SocketAddr> = OnceLock::new();
     *ADDRESS.get_or_init(|| {
-        let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../bags/samples/mission");
-        let shared = Shared::default();
-        let recording = shared.update(|ledger| read_bag(&bag, "/swath", ledger)).unwrap();
         let listener = listen("127.0.0.1:0".parse().unwrap(), false).unwrap();
         let address = listener.local_addr().unwrap();
-        let (title, elevation_min_deg) = (recording.title, recording.elevation_min_deg);
-        let guard = Guard::of_this_machine(address.port());
-        let site = Site { shared, counter: None, title, elevation_min_deg, guard };
+        let site = recorded(Guard::of_this_machine(address.port()));
         std::thread::spawn(move || serve(listener, None, site));
         address
     })
@@ -60,7 +64,7 @@ fn exchange(request: &str) -> (u16, String, String) {
     (status, head.to_lowercase(), body.to_owned())
 }
 
-fn ask(method: &str, path: &str, more: &str, body: &str) -> (u16, String, String) {
+pub fn ask(method: &str, path: &str, more: &str, body: &str) -> (u16, String, String) {
     let host = replay();
     let length = body.len();
     exchange(&format!(

@@ -84,7 +84,7 @@ function Nodes() {
   const nodes = world.value.nodes;
   if (!nodes) return null;
   const again = (name: string) => {
-    const count = world.value.restarts.get(name);
+    const count = nodes.restarts[name];
     return count ? ` · ${count} restart${count > 1 ? "s" : ""}` : "";
   };
   return (

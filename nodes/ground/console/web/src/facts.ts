@@ -162,6 +162,8 @@ export interface NodesFact extends Head {
   kind: "nodes";
   present: string[];
   missing: string[];
+  /** How often each was started anew; not those that never were. */
+  restarts: Record<string, number>;
 }
 
 export type Fact =

@@ -63,8 +63,6 @@ export class World {
   readonly alarms = new Map<number, Alarm>();
   nodes: f.NodesFact | undefined;
   /** Nodes that have been there, and how often each has come back. */
-  readonly seen = new Set<string>();
-  readonly restarts = new Map<string, number>();
 
   take(fact: f.Fact): void {
     if (fact.t > 0) {
@@ -144,10 +142,6 @@ export class World {
         break;
       }
       case "nodes":
-        for (const name of this.nodes?.missing ?? []) {
-          if (fact.present.includes(name) && this.seen.has(name)) this.restarts.set(name, (this.restarts.get(name) ?? 0) + 1);
-        }
-        fact.present.forEach((name) => this.seen.add(name));
         this.nodes = fact;
         break;
     }

@@ -65,9 +65,3 @@ test("an alarm that is put aside does not count until its time is over", () => {
   expect([30, 99, 100].map((t) => world.stands(known, t))).toEqual([false, false, true]);
   expect(known).toMatchObject({ count: 2, aside: { reason: "known" } });
 });
-
-test("a node that was there, is missing and comes back has been restarted", () => {
-  const nodes = (n: number, present: string[], missing: string[]): Fact => ({ n, t: n, kind: "nodes", present, missing });
-  const world = worldOf(nodes(1, [], ["planner"]), nodes(2, ["planner"], []), nodes(3, [], ["planner"]), nodes(4, ["planner"], []));
-  expect(world.restarts.get("planner")).toBe(1);
-});
