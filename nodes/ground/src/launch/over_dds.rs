@@ -115,6 +115,7 @@ pub fn fly(
         nodes,
         orders: orders(output),
         resources: None,
+        link: None,
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
 }
