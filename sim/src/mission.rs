@@ -142,6 +142,12 @@ impl<K: RequestKeeper> Mission<K> {
         &self.keeper
     }
 
+    /// Whoever keeps the requests, to be told what goes on while a task is flown; [`Self::change`] is for what changes
+    /// what may be imaged.
+    pub fn keeper_mut(&mut self) -> &mut K {
+        &mut self.keeper
+    }
+
     /// What came to the ground so far.
     #[must_use]
     pub fn delivered(&self) -> &Delivered {

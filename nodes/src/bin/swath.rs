@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use anyhow::{Error, Result};
 use clap::{Parser, Subcommand};
 use swath_ground::debrief::{export, refly, report};
-use swath_ground::{launch, operate};
+use swath_ground::{launch, operate, passes};
 use swath_node::out;
 use swath_nodes::POLICIES;
 use swath_ros::RosArgs;
@@ -28,8 +28,12 @@ enum Command {
     Planner(operate::PlannerArgs),
     /// Say what is wrong, and what operators know of it.
     Alarms(operate::AlarmsArgs),
+    /// Say when stations see the satellite of a mission, from its file alone.
+    Passes(passes::PassesArgs),
     /// Show a flying or a recorded mission as a page in a browser.
     Console(swath_console::ConsoleArgs),
+    /// Show a flying or a recorded mission in Foxglove.
+    Bridge(swath_bridge::BridgeArgs),
     /// Fly a recorded mission again, with the same or another planner, and compare.
     Refly(refly::ReflyArgs),
     /// Tell of a recorded mission in one page: map, timeline, plots, decisions.
@@ -54,7 +58,9 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
         Command::Alarms(args) => operate::run_alarms(&args, ros)?,
+        Command::Passes(args) => passes::run(&args)?,
         Command::Console(args) => swath_console::run(&args, ros)?,
+        Command::Bridge(args) => swath_bridge::run(&args, ros)?,
         Command::Refly(args) => return args.run(&POLICIES),
         Command::Report(args) => return args.run(),
         Command::Export(args) => return args.run(),

@@ -4,10 +4,15 @@
 mod alarms;
 mod bad_input;
 mod bag;
+mod bridge;
 mod clients;
 mod common;
 mod console;
+mod datagrams;
 mod examples;
+#[path = "../../examples/common/flight.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod flight;
 mod habits;
 mod killed;
 mod operators_day;
@@ -16,5 +21,9 @@ mod peer;
 mod pins;
 mod readme;
 mod recorded;
+mod storm;
+#[path = "../../ros/tests/it/stranger.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod stranger;
 mod supervised;
 mod two_satellites;

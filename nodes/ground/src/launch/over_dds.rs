@@ -25,9 +25,14 @@ use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
 use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
-use swath_mission::outcome::{Summary, SummaryInputs};
+use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
+use crate::requests::orders::{Orders, stored};
+use crate::requests::store::Store;
+
+/// The request manager's store in the output folder.
+const STORE: &str = "requests.sqlite";
 /// How long the recorder and the console may take to come up.
 const START_TIMEOUT: Duration = Duration::from_secs(20);
 /// In lockstep, a mission without a decision for so long has stalled.
@@ -67,9 +72,9 @@ pub fn fly(
     let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
-        let mission = text(mission_file)?;
-        let words = ["record", "--use-sim-time", "--resume", "--manifest", &mission, "--output", &text(&bag)?];
-        let words = words.map(str::to_owned).into_iter().chain(manifest_data);
+        let (manifest, output) = (text(mission_file)?, text(&bag)?);
+        let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
+        let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
         let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words)?;
         fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
@@ -111,9 +116,23 @@ pub fn fly(
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,
+        orders: orders(output),
         resources: None,
+        link: None,
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
+}
+
+/// What became of orders, from the store that the request manager left.
+fn orders(output: &OutputFolder) -> Vec<OrderOutcome> {
+    let requests = Store::open_read_only(&output.path().join(STORE)).map_err(Into::into).and_then(|it| stored(&it));
+    match requests {
+        Ok(requests) => Orders::of(requests.into_iter().map(|(_, status)| status)).outcomes(),
+        Err(error) => {
+            tracing::warn!("the share imaged of orders is unknown: {error:#}");
+            Vec::new()
+        }
+    }
 }
 
 /// What the manifest of the bag tells besides the mission.
@@ -154,7 +173,7 @@ fn start_nodes(
         let own = ["--ros-args", "-p", &mission, "-p", &keep].map(str::to_owned);
         own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
-    let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
+    let store = format!("store:={}", text(&output.path().join(STORE))?);
     fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
     for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
         fleet.start(name, program, &words(&[]))?;
