@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::mission::Mission as Loop;
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
 use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
 use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
 use crate::alarms::Board;
