@@ -1,6 +1,6 @@
 //! What the programs of a mission link besides the nodes: the learned policies.
 
-use swath_mission::guarded::Policies;
+use swath_mission::fallback::Policies;
 
 /// The policies that these programs can fly.
 pub const POLICIES: Policies = Policies {

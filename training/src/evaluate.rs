@@ -16,7 +16,7 @@ use swath_sim::vehicle::model::Model;
 use crate::error::{Result, TrainingError};
 use crate::planners::Prepared;
 
-pub use swath_sim::learn::score::Score as Mission;
+pub use swath_sim::learn::statistics::Score as Mission;
 
 /// Which missions to fly.
 #[derive(Debug, Clone, PartialEq)]

@@ -52,7 +52,8 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-bags", &["tch", "torch-sys"]),
     ("swath-training", &["ros2-client", "rustdds", "mcap"]),
     ("swath-python", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
-    ("swath-mission", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
+    // Of SQLite it knows the files that people bring (GeoPackage), no store.
+    ("swath-mission", &["ros2-client", "rustdds", "mcap", "tch", "torch-sys"]),
     ("swath-node", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-ground", &["tch", "torch-sys"]),

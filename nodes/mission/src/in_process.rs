@@ -311,7 +311,7 @@ mod tests {
 
     use super::*;
     use crate::alarms::{Entry, Event};
-    use crate::guarded::GuardedPlanner;
+    use crate::fallback::GuardedPlanner;
 
     fn mission(faults: &[&str]) -> Mission {
         let text =

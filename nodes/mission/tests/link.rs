@@ -1,4 +1,5 @@
 //! Missions over the radio in one process.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use swath_mission::file::Mission;
 use swath_mission::in_process::InProcessMission;

@@ -20,10 +20,10 @@ use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use swath_mission::alarms::conditions::{Report, of_plan, report_all};
 use swath_mission::alarms::{Board, Entry, Key};
+use swath_mission::fallback::{Deciders, Policies, fallback, made_instead};
 use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
-use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
 use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 

@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
     use swath_mission::approval::ApprovalConfig;
-    use swath_mission::guarded::GuardedPlanner;
+    use swath_mission::fallback::GuardedPlanner;
 
     fn logic(env: &Env, planner: impl Planner + Send + 'static) -> PlannerLogic {
         let gate = Gate::new(&ApprovalConfig::default(), env.model().period);

@@ -16,9 +16,9 @@ use super::logic::{Planned, PlannerLogic};
 use super::messages;
 use swath_mission::alarms::conditions::of_planner;
 use swath_mission::approval::{ApprovalConfig, Gate, GatedPlanner, Mode};
+use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
-use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{Parameter, Program};
 
