@@ -138,7 +138,7 @@ fn without_commands_the_satellite_images_nothing_until_it_hears_again() {
     let link = "stations = [\"puertollano\", \"awarua\", \"punta-arenas\"]\ncommand_loss_h = 1.0";
     let mission = mission(8.0, 1500, 2, link);
     let (tasks, flight) = flown(&mission, Vec::new());
-    let passes: Vec<(Tick, Tick)> = flight.link().unwrap().radio().contacts().from(Tick(0)).iter().copied().collect();
+    let passes: Vec<(Tick, Tick)> = flight.link().unwrap().radio().contacts().from(Tick(0)).to_vec();
     let lost = |tick: Tick| passes.iter().all(|(rise, set)| tick < *rise || tick.since(*set) >= 7200);
     let images = |it: &&SettledTask| it.record.strip.is_some();
     assert!(tasks.iter().filter(images).count() > 10);
