@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod bag;
+mod citizens;
 mod clients;
 mod common;
 mod console;

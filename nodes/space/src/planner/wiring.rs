@@ -70,6 +70,9 @@ impl PlannerNode {
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
+        if let Some(warning) = policies.warning(&spec, &base.mission.sim) {
+            tracing::warn!("{warning}");
+        }
         let gate = Gate::new(&base.mission.approval, base.model.period);
         let planner = GatedPlanner { gate, planner };
         Ok(Self {
