@@ -5,6 +5,11 @@ use std::collections::BTreeMap;
 /// The metadata record that tells how a recording went.
 pub const RECORDING: &str = "swath_recording";
 
+/// The metadata record that tells in which file a recording goes on that was interrupted.
+pub(crate) const RESUMED: &str = "swath_resumed";
+/// Its entry that names the file.
+pub(crate) const RESUMED_FILE: &str = "file";
+
 /// Messages that were to be in a bag and are not.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Losses {

@@ -23,6 +23,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-node", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission"]),
     ("swath-space", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-node"]),
     ("swath-ground", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
+    ("swath-bridge", &["swath-msgs", "swath-ros", "swath-bags", "swath-mission"]),
     ("swath-console", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
     (
         "swath-nodes",
@@ -36,6 +37,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "swath-space",
             "swath-ground",
             "swath-console",
+            "swath-bridge",
             "swath-training",
         ],
     ),
@@ -55,6 +57,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-ground", &["tch", "torch-sys"]),
     ("swath-console", &["tch", "torch-sys", "parquet", "plotters"]),
+    ("swath-bridge", &["tch", "torch-sys", "rusqlite"]),
     ("xtask", &["tch", "torch-sys", "ros2-client", "rustdds"]),
 ];
 

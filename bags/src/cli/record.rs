@@ -87,6 +87,9 @@ pub struct RecordArgs {
     /// Start paused
     #[arg(long)]
     start_paused: bool,
+    /// Go on with the bag, if it is there, in a new file; files that were not closed are saved when this one is
+    #[arg(long)]
+    resume: bool,
     /// Kind of files: mcap is the only one that is written
     #[arg(short, long, default_value = "mcap", value_parser = ["mcap"])]
     storage: String,
@@ -158,6 +161,7 @@ impl RecordArgs {
             bag: BagOptions {
                 snapshot_bytes: self.snapshot_mode.then_some(self.max_cache_size as usize),
                 custom_data: self.custom_data.into_iter().collect(),
+                resume: self.resume,
                 ..shape
             },
             selection,

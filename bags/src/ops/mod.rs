@@ -21,6 +21,7 @@ mod checks;
 pub mod convert;
 pub mod copy;
 pub mod info;
+pub mod mend;
 pub mod recover;
 pub mod reindex;
 mod report;

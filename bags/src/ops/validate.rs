@@ -16,6 +16,7 @@ use crate::file::record::{self, misplaced};
 use crate::file::source::{ReadOptions, Source};
 use crate::file::storage::Storage;
 use crate::file::walk::Walk;
+use crate::losses::{RESUMED, RESUMED_FILE};
 use crate::metadata::{BagInformation, FILE_NAME};
 use crate::reader::{Bag, Filter, metadata_path};
 
@@ -54,11 +55,21 @@ pub fn validate_open(bag: &Bag, max_gap_ns: Option<u64>) -> Result<Report> {
     for (check, topic) in checks.into_iter().zip(bag.topics()) {
         report.topics.push(check.finish(topic, max_gap_ns, &mut report.faults, &mut report.warnings));
     }
+    name_interruptions(bag, &mut report);
     let lost = bag.losses().total();
     if lost > 0 {
         report.warnings.push(format!("the recording lost {lost} messages"));
     }
     Ok(report)
+}
+
+/// Names the files before which nobody recorded for a while, because the recording was interrupted.
+fn name_interruptions(bag: &Bag, report: &mut Report) {
+    for (_, metadata) in bag.metadata().iter().filter(|(name, _)| name == RESUMED) {
+        if let Some(file) = metadata.get(RESUMED_FILE) {
+            report.warnings.push(format!("the recording was interrupted, and goes on in {file}"));
+        }
+    }
 }
 
 fn check_file(file: &FileIndex, report: &mut Report) {

@@ -4,7 +4,7 @@ mod control;
 mod sink;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 pub use sink::BagSink;
@@ -12,6 +12,8 @@ use swath_ros::{Node, RosArgs, Shutdown, graph};
 
 use self::control::{Control, Wishes};
 use crate::error::{BagError, Result};
+use crate::file::source::ReadOptions;
+use crate::ops::mend::mend;
 use crate::tap::{Selection, Tap};
 use crate::writer::{BagOptions, BagSummary, BagWriter, Counter};
 
@@ -44,6 +46,8 @@ pub struct Recorder {
     tap: Tap,
     sink: BagSink,
     chores_at: Instant,
+    /// Whether others have written files of the bag before.
+    resumed: bool,
 }
 
 impl Recorder {
@@ -53,6 +57,7 @@ impl Recorder {
     /// [`BagError::Exists`] when the bag is there already; [`BagError::Ros`] when the node cannot
     /// be started.
     pub fn start(options: RecordOptions, args: &RosArgs) -> Result<Self> {
+        let resumed = options.bag.resume && options.output.is_dir();
         let writer = BagWriter::create(&options.output, options.bag)?;
         for (name, pairs) in options.metadata {
             writer.add_metadata(&name, pairs);
@@ -62,7 +67,7 @@ impl Recorder {
         let node = Node::start(graph::RECORDER, args)?;
         let control = Control::new(&node)?;
         let tap = Tap::new(node, options.selection)?;
-        Ok(Self { control, tap, sink, chores_at: Instant::now() })
+        Ok(Self { control, tap, sink, chores_at: Instant::now(), resumed })
     }
 
     /// The node's signal, for [`Shutdown::on_signals`].
@@ -144,14 +149,25 @@ impl Recorder {
     }
 
     fn close(self) -> Result<BagSummary> {
-        let Self { control, tap, sink, .. } = self;
+        let Self { control, tap, sink, resumed, .. } = self;
         let stamp = tap.node().clock().stamp();
+        let dir = sink.writer().dir().to_owned();
         let summary = sink.close();
+        let summary = if resumed { summary.and_then(|summary| whole(&dir, summary)) } else { summary };
         control.report_end(&summary, stamp);
         drop(control);
         drop(tap);
         summary
     }
+}
+
+/// Closes what recorders before have left open, and tells of the whole bag.
+fn whole(dir: &Path, summary: BagSummary) -> Result<BagSummary> {
+    let (information, faults) = mend(dir, ReadOptions::default())?;
+    for fault in faults {
+        tracing::warn!("an interrupted recording: {fault}");
+    }
+    Ok(BagSummary { messages: information.message_count, files: information.files.len(), ..summary })
 }
 
 impl From<swath_ros::RosError> for BagError {

@@ -35,6 +35,8 @@ struct Finished {
 pub(super) struct Storage {
     dir: PathBuf,
     name: String,
+    /// Number of its first file: those before were written by others.
+    first: usize,
     options: BagOptions,
     compressor: Compressor,
     open: OpenDisk,
@@ -52,15 +54,22 @@ pub(super) struct Storage {
 }
 
 impl Storage {
-    /// Starts the first file of the bag in the existing directory `dir`.
-    pub(super) fn create(dir: &Path, compressor: Compressor, options: BagOptions, open: OpenDisk) -> Result<Self> {
-        let name = dir.file_name().map_or("bag".into(), |n| n.to_string_lossy().into_owned());
-        let path = dir.join(format!("{name}_0.mcap"));
+    /// Starts file number `first` of the bag in the existing directory `dir`.
+    pub(super) fn create(
+        dir: &Path,
+        first: usize,
+        compressor: Compressor,
+        options: BagOptions,
+        open: OpenDisk,
+    ) -> Result<Self> {
+        let name = bag_name(dir);
+        let path = dir.join(file_name(&name, first));
         let create = |disk| FileWriter::create(disk, &options.profile);
         let file = open(&path).and_then(create).map_err(BagError::io("create", &path))?;
         Ok(Self {
             dir: dir.to_owned(),
             name,
+            first,
             options,
             compressor,
             open,
@@ -151,7 +160,7 @@ impl Storage {
 
     /// The name of the file that is being written.
     fn file_name(&self) -> String {
-        format!("{}_{}.mcap", self.name, self.finished.len())
+        file_name(&self.name, self.first + self.finished.len())
     }
 
     fn finish_file(&mut self) -> io::Result<()> {
@@ -282,6 +291,16 @@ impl Storage {
             ros_distro: self.options.ros_distro.clone(),
         }
     }
+}
+
+/// The name that a bag's files begin with.
+pub(super) fn bag_name(dir: &Path) -> String {
+    dir.file_name().map_or("bag".into(), |n| n.to_string_lossy().into_owned())
+}
+
+/// The name of a bag's file of a number.
+pub(super) fn file_name(name: &str, number: usize) -> String {
+    format!("{name}_{number}.mcap")
 }
 
 fn file_information(file: &Finished) -> FileInformation {

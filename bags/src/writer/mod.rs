@@ -19,7 +19,7 @@ use crate::error::{BagError, Result};
 use crate::file::attachment::Attachment;
 use crate::file::chunk::Compressor;
 use crate::file::writer::TopicIds;
-use crate::losses::Losses;
+use crate::losses::{Losses, RESUMED, RESUMED_FILE};
 use crate::reader::Message;
 use crate::topic::Topic;
 
@@ -38,7 +38,8 @@ impl BagWriter {
     /// Makes the directory `dir` and starts the bag's first file.
     ///
     /// # Errors
-    /// [`BagError::Exists`] when `dir` is there already, [`BagError::Io`] when it cannot be made.
+    /// [`BagError::Exists`] when `dir` is there already and the bag is not to be resumed, [`BagError::Io`] when it cannot
+    /// be made.
     pub fn create(dir: &Path, options: BagOptions) -> Result<Self> {
         Self::create_on(dir, options, Box::new(disk::open_file))
     }
@@ -48,10 +49,15 @@ impl BagWriter {
         if let Some(parent) = dir.parent() {
             fs::create_dir_all(parent).map_err(BagError::io("create", parent))?;
         }
-        fs::create_dir(dir).map_err(|e| match e.kind() {
-            std::io::ErrorKind::AlreadyExists => BagError::Exists { path: dir.to_owned() },
-            _ => BagError::io("create", dir)(e),
-        })?;
+        let resumes = options.resume && dir.is_dir();
+        if !resumes {
+            fs::create_dir(dir).map_err(|e| match e.kind() {
+                std::io::ErrorKind::AlreadyExists => BagError::Exists { path: dir.to_owned() },
+                _ => BagError::io("create", dir)(e),
+            })?;
+        }
+        let name = disk::bag_name(dir);
+        let first = (0..).find(|&number| !dir.join(disk::file_name(&name, number)).exists()).unwrap_or(0);
         let compressor = Compressor::new(options.compression, options.zstd_level)
             .map_err(|e| BagError::Option { option: "--compression", reason: e.to_string() })?;
         let shared = Arc::new(Shared {
@@ -60,13 +66,17 @@ impl BagWriter {
             work: Condvar::new(),
             room: Condvar::new(),
         });
-        let storage = disk::Storage::create(dir, compressor, shared.options.clone(), open)?;
+        let storage = disk::Storage::create(dir, first, compressor, shared.options.clone(), open)?;
         let for_thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("bag-disk".to_owned())
             .spawn(move || storage.run(&for_thread))
             .map_err(BagError::io("start the thread of", dir))?;
-        Ok(Self { dir: dir.to_owned(), shared, thread: Some(thread) })
+        let writer = Self { dir: dir.to_owned(), shared, thread: Some(thread) };
+        if first > 0 {
+            writer.add_metadata(RESUMED, BTreeMap::from([(RESUMED_FILE.to_owned(), disk::file_name(&name, first))]));
+        }
+        Ok(writer)
     }
 
     /// The bag directory.

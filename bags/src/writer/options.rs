@@ -28,6 +28,8 @@ pub struct BagOptions {
     pub custom_data: BTreeMap<String, String>,
     /// ROS distribution named in `metadata.yaml`.
     pub ros_distro: String,
+    /// Go on with a bag that is there, in a new file.
+    pub resume: bool,
 }
 
 impl Default for BagOptions {
@@ -43,6 +45,7 @@ impl Default for BagOptions {
             profile: "ros2".to_owned(),
             custom_data: BTreeMap::new(),
             ros_distro: "jazzy".to_owned(),
+            resume: false,
         }
     }
 }

@@ -27,6 +27,7 @@ use crate::orders::import::{Fault, RequestsFileError, import};
 use crate::orders::order::Order;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
+use crate::supervision::SupervisionConfig;
 
 /// In a paced mission, the wall-clock time that planning a task may take where ticks are shorter than that; the time lost
 /// is made up.
@@ -115,6 +116,13 @@ pub struct Mission {
     /// What fails on the way.
     #[serde(skip_serializing_if = "FaultPlan::is_empty")]
     pub faults: FaultPlan,
+    /// What the launcher does about nodes that end or hang.
+    #[serde(skip_serializing_if = "is_usual")]
+    pub supervision: SupervisionConfig,
+}
+
+fn is_usual(supervision: &SupervisionConfig) -> bool {
+    *supervision == SupervisionConfig::default()
 }
 
 fn is_exact(plant: &PlantErrors) -> bool {
@@ -161,6 +169,7 @@ impl Default for Mission {
             resources: None,
             plant: PlantErrors::default(),
             faults: FaultPlan::default(),
+            supervision: SupervisionConfig::default(),
         }
     }
 }
@@ -208,6 +217,14 @@ impl Mission {
             ("approval.deadline_s", self.approval.deadline_s, 0.1, 1e6),
             ("approval.look_again_s", self.approval.look_again_s, 0.1, 3600.0),
             ("requests.swath_km", self.requests.swath_km, 0.1, 1000.0),
+            ("supervision.backoff_s", self.supervision.backoff_s, 0.01, 3600.0),
+            ("supervision.backoff_max_s", self.supervision.backoff_max_s, 0.01, 3600.0),
+            ("supervision.starts", f64::from(self.supervision.starts), 0.0, 1000.0),
+            ("supervision.within_s", self.supervision.within_s, 1.0, 1e6),
+            ("supervision.warn_s", self.supervision.warn_s, 1.0, 3600.0),
+            ("supervision.kill_s", self.supervision.kill_s, 2.0, 3600.0),
+            ("supervision.startup_s", self.supervision.startup_s, 1.0, 3600.0),
+            ("supervision.orphaned_s", self.supervision.orphaned_s, 1.0, 1e9),
         ] {
             if !(min..=max).contains(&value) {
                 return Err(MissionError::OutOfRange { name, value, min, max });

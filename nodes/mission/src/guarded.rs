@@ -41,6 +41,12 @@ const WHEEL_LOST: &str = "a wheel is lost, and the planner does not know what th
 /// The planner that takes over.
 const FALLBACK: Heuristic = Heuristic { t_pre_s: FALLBACK_T_PRE_S };
 
+/// Name of the planner that takes over.
+#[must_use]
+pub fn fallback() -> String {
+    FALLBACK.name()
+}
+
 /// Who made the decisions of a mission: their numbers by name of the planner.
 pub type Deciders = BTreeMap<String, u64>;
 

@@ -12,5 +12,6 @@ pub mod orders;
 pub mod outcome;
 pub mod requests;
 pub mod shapes;
+pub mod supervision;
 pub mod task_log;
 pub mod time_text;

@@ -1,6 +1,7 @@
 //! What every node of a mission starts with: its ROS node, its mission, its alarms.
 
-use std::path::PathBuf;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,6 +20,8 @@ use crate::stamp::Stamper;
 use swath_mission::alarms;
 use swath_mission::alarms::conditions::Report;
 use swath_mission::alarms::definitions::definition;
+use swath_mission::faults::grammar::{Failure, Process};
+use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
 
 /// A started node and the mission that it flies.
@@ -36,6 +39,10 @@ pub struct MissionNode {
     /// Stamps of its ticks.
     pub stamper: Stamper,
     diagnostics: Publisher<DiagnosticArray>,
+    keep: Option<PathBuf>,
+    /// What is ordered to befall this node, the next first, and how often something has already.
+    ordered: VecDeque<(Scheduled, Failure)>,
+    struck: u64,
 }
 
 /// How grave an alarm is.
@@ -68,6 +75,13 @@ impl MissionNode {
         }
         let mission = Mission::read(&path)?;
         let model = Arc::new(mission.model()?);
+        let keep =
+            Spec::new("keep", String::new(), "Folder for what the node needs to go on when it is started again.");
+        let keep = PathBuf::from(node.parameters().declare(keep.read_only())?);
+        let struck = Spec::new("struck", 0_i64, "Faults ordered for this node that have befallen it already.");
+        let struck = node.parameters().declare(struck.in_range(0.0..=1e6).read_only())?.unsigned_abs();
+        let process = Process::ALL.into_iter().find(|process| process.name() == name);
+        let ordered = process.map(|process| mission.faults.of(process, model.period)).unwrap_or_default();
         let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
         Ok(Self {
             shutdown,
@@ -76,8 +90,53 @@ impl MissionNode {
             model,
             mission,
             diagnostics,
+            keep: (!keep.as_os_str().is_empty()).then_some(keep),
+            ordered: ordered.into_iter().skip(struck as usize).collect(),
+            struck,
             node,
         })
+    }
+
+    /// A file in which this node keeps what it needs to go on when it is started again; nothing where nobody would.
+    #[must_use]
+    pub fn keeps(&self, name: &str) -> Option<PathBuf> {
+        self.keep.as_ref().map(|folder| folder.join(name))
+    }
+
+    /// What this node kept in a file before it was started again; nothing if this is its first start.
+    ///
+    /// # Errors
+    /// When the file is there and cannot be read.
+    pub fn kept(&self, name: &str) -> Result<Option<String>> {
+        let Some(path) = self.keeps(name).filter(|path| self.node.epoch() > 0 && path.exists()) else {
+            return Ok(None);
+        };
+        std::fs::read_to_string(&path).map(Some).with_context(|| format!("cannot read {}", path.display()))
+    }
+
+    /// Tick at which the next fault that was ordered for this node befalls it.
+    #[must_use]
+    pub fn strikes_at(&self) -> Option<Tick> {
+        self.ordered.front().map(|(it, _)| it.from)
+    }
+
+    /// The fault that was ordered for this node befalls it now; what it has sent must have arrived.
+    pub fn strike(&self) -> ! {
+        self.node.tell_struck(self.struck);
+        match self.ordered.front() {
+            Some((_, Failure::Hang)) => loop {
+                std::thread::sleep(Duration::from_secs(3600));
+            },
+            _ => std::process::abort(),
+        }
+    }
+
+    /// The fault that befell this node last, if it was started again because of one.
+    #[must_use]
+    pub fn struck(&self) -> Option<Scheduled> {
+        let process = Process::ALL.into_iter().find(|process| self.node.names().name() == process.name())?;
+        let last = usize::try_from(self.struck.checked_sub(1)?).ok()?;
+        self.mission.faults.of(process, self.model.period).get(last).map(|(it, _)| *it)
     }
 
     /// Waits for news, and tells whether there are any; what went wrong with the messages of others is an alarm.
@@ -157,6 +216,17 @@ impl MissionNode {
         array.status.push(status);
         self.diagnostics.publish(&array).context("cannot raise an alarm")
     }
+}
+
+/// Keeps a text in a file, whole or not at all.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn keep(path: &Path, text: &str) -> Result<()> {
+    let failed = || format!("cannot write {}", path.display());
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, text).with_context(failed)?;
+    std::fs::rename(&partial, path).with_context(failed)
 }
 
 /// Turns the outcome of a node into an exit code; an error is told once, in the log as soon as there is one.

@@ -20,6 +20,9 @@ pub const INERTIAL_FRAME: &str = "eci";
 /// Name of the planet-fixed frame E in headers.
 pub const EARTH_FRAME: &str = "ecef";
 
+/// Name of the orbit frame in headers: x away from the Earth, z along the angular momentum (Hill frame).
+pub const ORBIT_FRAME: &str = "orbit";
+
 /// Name of the body frame B in headers.
 pub const BODY_FRAME: &str = "body";
 

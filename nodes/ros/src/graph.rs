@@ -40,6 +40,8 @@ pub const RECORDER: &str = "recorder";
 pub const PLAYER: &str = "player";
 /// The page in a browser and the HTTP API, an operator like others.
 pub const CONSOLE: &str = "console";
+/// Shows topics to Foxglove.
+pub const BRIDGE: &str = "bridge";
 /// A person's command line or another program.
 pub const OPERATOR: &str = "operator";
 

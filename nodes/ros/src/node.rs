@@ -29,6 +29,7 @@ use crate::names::{Names, dds_service, dds_topic, dds_type};
 use crate::node_services::NodeServices;
 use crate::notices::Notice;
 use crate::params::{Parameters, Spec};
+use crate::pulse::{Pulse, SIGN_EVERY, Sign, say};
 use crate::qos::{Profile, QosProfile, with_depth};
 use crate::replies::AllReplies;
 use crate::roster::{Direction, Roster};
@@ -62,6 +63,8 @@ pub struct Node {
     parameters: Parameters,
     clock: SimClock,
     signal: Signal,
+    pulse: Pulse,
+    epoch: u64,
     replies: AllReplies,
     names: Names,
     environment: Environment,
@@ -88,6 +91,8 @@ impl Node {
         let (identity, members) = declare_identity(name, &names, &parameters)?;
         let is_member = graph::MEMBERS.contains(&name);
         declare_memory(is_member, &parameters)?;
+        let pulse = declare_pulse(&parameters)?;
+        let epoch = identity.epoch;
         let screened = "Whether the kernel drops datagrams that would end DDS or fill the memory.";
         let screened = parameters.declare(Spec::new("packet_filter", is_member, screened).read_only())?;
         let dds = Arc::new(Dds::new(&environment, screened)?);
@@ -114,14 +119,28 @@ impl Node {
         let background =
             Background::start(hearing, shared_dds, shared_roster, minder, replies.clone(), signal.clone())?;
         let clock = SimClock::default();
-        let node =
-            Self { background, introduction, roster, parameters, clock, signal, replies, names, environment, dds };
+        let node = Self {
+            background,
+            introduction,
+            roster,
+            parameters,
+            clock,
+            signal,
+            pulse,
+            epoch,
+            replies,
+            names,
+            environment,
+            dds,
+        };
         node.come_up(args, &identity)?;
         Ok(node)
     }
 
     fn come_up(&self, args: &RosArgs, identity: &Identity) -> Result<(), RosError> {
-        if self.roster.wait_until(Instant::now() + LISTENING, || self.roster.namesake().is_some()) {
+        // Of one that is started again, the one before may still be told of.
+        let again = self.epoch > 0;
+        if !again && self.roster.wait_until(Instant::now() + LISTENING, || self.roster.namesake().is_some()) {
             return Err(self.duplicate());
         }
         self.introduce(identity)?;
@@ -279,16 +298,24 @@ impl Node {
     /// # Errors
     /// As [`Self::check`].
     pub fn wait(&self, timeout: Duration) -> Result<bool, RosError> {
-        let news = self.signal.wait(timeout);
-        self.check()?;
-        Ok(news)
+        let start = Instant::now();
+        loop {
+            let left = timeout.saturating_sub(start.elapsed());
+            let news = self.signal.wait(left.min(SIGN_EVERY));
+            self.check()?;
+            if news || start.elapsed() >= timeout {
+                return Ok(news);
+            }
+        }
     }
 
-    /// Looks whether this node may go on; for those who wait for its signal themselves.
+    /// Looks whether this node may go on, and gives a sign of life to its launcher; for those who wait for its signal
+    /// themselves.
     ///
     /// # Errors
     /// If another node that came up together with it has its name, or if its DDS has died.
     pub fn check(&self) -> Result<(), RosError> {
+        self.pulse.beat(self.clock.now_ns());
         match self.background.fault() {
             None => Ok(()),
             Some(Fault::Namesake) => Err(self.duplicate()),
@@ -312,8 +339,12 @@ impl Node {
     /// If that is not so when the time is over; the error names what is missing.
     pub fn wait_for_peers(&self, nodes: &[&str], timeout: Duration) -> Result<(), RosError> {
         let deadline = Instant::now() + timeout;
-        if !self.roster.wait_until(deadline, || signalled() || self.roster.missing(nodes).is_empty()) {
-            return Err(RosError::MissingPeers { waited: timeout, missing: self.roster.missing(nodes) });
+        let there = || signalled() || self.roster.missing(nodes).is_empty();
+        while !self.roster.wait_until(deadline.min(Instant::now() + SIGN_EVERY), there) {
+            self.check()?;
+            if Instant::now() >= deadline {
+                return Err(RosError::MissingPeers { waited: timeout, missing: self.roster.missing(nodes) });
+            }
         }
         if !signalled() {
             std::thread::sleep(SETTLING);
@@ -371,6 +402,23 @@ impl Node {
         &self.signal
     }
 
+    /// How often this node was started again in its mission.
+    #[must_use]
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// How long the launcher of this node has been gone; nothing while it listens, or when there was none.
+    #[must_use]
+    pub fn orphaned(&self) -> Option<Duration> {
+        self.pulse.orphaned()
+    }
+
+    /// Tells the launcher that what was ordered befalls this node now; with its number among those, from 0.
+    pub fn tell_struck(&self, number: u64) {
+        say(&Sign::Struck(number));
+    }
+
     /// The names of this node.
     #[must_use]
     pub fn names(&self) -> &Names {
@@ -406,6 +454,14 @@ fn declare_identity(name: &str, names: &Names, parameters: &Parameters) -> Resul
     let namespace = names.namespace().to_owned();
     let members = Members::new(&namespace, fleet.clone(), external);
     Ok((Identity { namespace, node: name.to_owned(), fleet, epoch }, members))
+}
+
+/// Declares the parameter that says whether a launcher listens.
+fn declare_pulse(parameters: &Parameters) -> Result<Pulse, RosError> {
+    let text =
+        "How long the node goes on when the launcher, which listens on its stdout, is gone [s]; 0: none listens.";
+    let limit = parameters.declare(Spec::new("orphaned_s", 0.0, text).in_range(0.0..=1e9).read_only())?;
+    Ok(Pulse::new((limit > 0.0).then(|| Duration::from_secs_f64(limit))))
 }
 
 /// Declares the parameter that bounds the memory of this process, and bounds it.

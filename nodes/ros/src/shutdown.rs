@@ -22,6 +22,14 @@ pub(crate) fn signalled() -> bool {
     SIGNALLED.load(Ordering::Relaxed)
 }
 
+/// Whether this process ends by itself, because nobody is there for whom it works.
+static ENDED: AtomicBool = AtomicBool::new(false);
+
+/// Ends this process as a signal would.
+pub(crate) fn end() {
+    ENDED.store(true, Ordering::Relaxed);
+}
+
 /// Whether the process was asked to end. Clones are the same wish.
 #[derive(Clone, Default)]
 pub struct Shutdown {
@@ -59,7 +67,7 @@ impl Shutdown {
     /// Whether the process was asked to end.
     #[must_use]
     pub fn asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+        self.asked.load(Ordering::Relaxed) || ENDED.load(Ordering::Relaxed)
     }
 
     /// Asks the process to end.

@@ -28,6 +28,8 @@ enum Command {
     Planner(operate::PlannerArgs),
     /// Show a flying or a recorded mission as a page in a browser.
     Console(swath_console::ConsoleArgs),
+    /// Show a flying or a recorded mission in Foxglove.
+    Bridge(swath_bridge::BridgeArgs),
     /// Fly a recorded mission again, with the same or another planner, and compare.
     Refly(refly::ReflyArgs),
     /// Tell of a recorded mission in one page: map, timeline, plots, decisions.
@@ -52,6 +54,7 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
         Command::Console(args) => swath_console::run(&args, ros)?,
+        Command::Bridge(args) => swath_bridge::run(&args, ros)?,
         Command::Refly(args) => return args.run(&POLICIES),
         Command::Report(args) => return args.run(),
         Command::Export(args) => return args.run(),

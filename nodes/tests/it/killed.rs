@@ -61,7 +61,7 @@ fn nothing_acknowledged_is_lost_when_the_request_manager_is_killed_a_hundred_tim
 
 fn kill_and_look(kills: u64) {
     let folder = tempfile::tempdir().unwrap();
-    let text = "orbits = 60.0\npace = 200.0\nseed = 5\nplanner = \"heuristic:90\"\n";
+    let text = "orbits = 60.0\npace = 200.0\nseed = 5\nplanner = \"heuristic:90\"\n[supervision]\nstarts = 1000\n";
     let mission = common::write_mission(folder.path(), text);
     let out = folder.path().join("out");
     let store = out.join("requests.sqlite");

@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod bag;
+mod bridge;
 mod citizens;
 mod clients;
 mod common;
@@ -24,4 +25,5 @@ mod storm;
 #[path = "../../ros/tests/it/stranger.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod stranger;
+mod supervised;
 mod two_satellites;

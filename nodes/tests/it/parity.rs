@@ -102,12 +102,49 @@ fn wheels_and_sensors_that_fail_are_the_same_too() {
     }
 }
 
+/// Nodes that are killed or hang by order: the fallback flies for the ticks ordered, the clock stands while another node
+/// is started, and the tasks are those of a mission in one process that loses the same.
+#[test]
+fn nodes_that_fail_by_order_are_the_same_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let both = [
+        "guidance:kill@300s",
+        "guidance:hang@700s+20s",
+        "planner:kill@500s",
+        "planner:kill@1000s+95s",
+        "request_manager:kill@900s",
+        "wheel2:weak 60%@650s+200s",
+    ];
+    let over_dds = [&both[..], &["spacecraft:kill@400s", "recorder:kill@450s"]].concat();
+    let mission =
+        |plan: &[&str]| common::write_mission(folder.path(), &format!("{MISSION}[faults]\nplan = {plan:?}\n"));
+    let words = ["--planner", "lookahead", "--orbits", "0.5"];
+    let out = |kind: &str| folder.path().join(kind);
+    let in_process = tasks(&mission(&both), &out("in-process"), &[&words[..], &["--in-process"]].concat());
+    assert_eq!(tasks(&mission(&over_dds), &out("dds"), &words), in_process);
+    let alarms = |kind: &str| {
+        let text = std::fs::read_to_string(out(kind).join("alarms.jsonl")).unwrap();
+        let other = |line: &&str| !line.contains("spacecraft lost") && !line.contains("recorder lost");
+        let of = |line: &str| {
+            let mut entry: serde_json::Value = serde_json::from_str(line).unwrap();
+            entry.as_object_mut().unwrap().remove("number");
+            entry
+        };
+        text.lines().filter(other).map(of).collect::<Vec<_>>()
+    };
+    assert_eq!(alarms("dds"), alarms("in-process"));
+    assert_eq!(alarms("dds").len(), 12);
+    let mut validate = common::command("swath-bag", "0");
+    let told = common::succeed(validate.arg("validate").arg(out("dds").join("bag")));
+    assert!(told.contains("the recording was interrupted"), "{told}");
+}
+
 #[test]
 fn faults_that_cannot_be_flown_over_dds_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
-    let mission = common::write_mission(folder.path(), "orbits = 0.5\n[faults]\nplan = [\"guidance:kill@120s\"]\n");
+    let mission = common::write_mission(folder.path(), "orbits = 0.5\n[faults]\nplan = [\"store:full@120s\"]\n");
     let mut launch = common::command("swath", &common::domain());
     let output = launch.arg("launch").arg(&mission).arg("--out").arg(folder.path().join("out")).output().unwrap();
     let text = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && text.contains("guidance:kill@120s cannot be flown over DDS"), "{text}");
+    assert!(!output.status.success() && text.contains("store:full@120s cannot be flown over DDS"), "{text}");
 }

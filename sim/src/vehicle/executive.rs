@@ -66,6 +66,13 @@ impl Executive {
         self.watch.as_mut().map(|watch| watch.take_changes()).unwrap_or_default()
     }
 
+    /// What another one had come to know before this one was there.
+    pub(super) fn precede_changes(&mut self, changes: Vec<(Tick, Health)>) {
+        if let Some(watch) = &mut self.watch {
+            watch.precede_changes(changes);
+        }
+    }
+
     /// Attitude, rate and wheel speeds as they are best known.
     #[inline]
     pub fn look(&mut self, sight: &Sight<'_>) -> BodyState {

@@ -154,7 +154,10 @@ impl Flight {
 
     /// Flies without guidance until `back`, a tick at least; `executive` takes over then.
     pub fn without_guidance(&mut self, back: Tick, executive: Executive) {
+        // What the lost one had come to know was told at once.
+        let told = self.executive.take_changes();
         self.executive = executive;
+        self.executive.precede_changes(told);
         loop {
             self.advance();
             self.torque_pending = Vector3::zeros();

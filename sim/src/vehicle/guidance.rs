@@ -27,6 +27,14 @@ pub struct GuidanceTick {
 }
 
 impl GuidanceTick {
+    /// No torque, and nothing that is tracked.
+    pub const IDLE: Self = Self {
+        torque: Vector3::new(0.0, 0.0, 0.0),
+        error: TrackingError { sigma_BR: Vector3::new(0.0, 0.0, 0.0), omega_BR_B: Vector3::new(0.0, 0.0, 0.0) },
+        sin_elevation: 1.0,
+        imaging: false,
+    };
+
     /// Elevation of the satellite seen from the target [rad]; π/2 without one.
     #[must_use]
     pub fn elevation(&self) -> f64 {
@@ -198,8 +206,7 @@ impl Guidance {
     #[inline]
     pub fn tick(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState) -> GuidanceTick {
         let Some(mut active) = self.active.take() else {
-            let error = TrackingError { sigma_BR: Vector3::zeros(), omega_BR_B: Vector3::zeros() };
-            return GuidanceTick { torque: Vector3::zeros(), error, sin_elevation: 1.0, imaging: false };
+            return GuidanceTick::IDLE;
         };
         let mut boresight_B = None;
         let (sigma_BR, sin_elevation, imaging) = match active.task {

@@ -150,6 +150,11 @@ impl Watch {
         std::mem::take(&mut self.changes)
     }
 
+    /// What another watch had come to know before this one was there.
+    pub(super) fn precede_changes(&mut self, changes: Vec<(Tick, Health)>) {
+        self.changes.splice(0..0, changes);
+    }
+
     /// Remembers the torque commanded from the state at a tick [N m].
     pub fn commanded(&mut self, tick: Tick, torque: Vector3<f64>) {
         self.commands = [self.commands[1], Some((tick, torque))];

@@ -104,9 +104,13 @@ impl LaunchArgs {
 /// The exit code of a mission that was flown, but not by the planner that was asked for.
 const NOT_AS_ASKED: u8 = 3;
 
+/// The exit code of a mission that came into safe mode.
+const SAFE_MODE: u8 = 4;
+
 /// Flies a mission and prints its summary.
 ///
-/// The exit code is 3 when the heuristic decided in the place of the planner that was asked for.
+/// The exit code is 3 when another planner decided in the place of the one that was asked for, and 4 when the mission
+/// came into safe mode because a node was lost again and again.
 ///
 /// # Errors
 /// When the mission is not valid, a node fails or never comes up, or an output cannot be written. What was flown until
@@ -128,7 +132,7 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
     faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
     let flown = fly(args, &args.place.args(ros), &mission, &requests, &mut output, policies);
-    let Flown { summary, failure } = match flown {
+    let Flown { summary, failure, safe_mode } = match flown {
         Ok(flown) => flown,
         Err(error) => {
             output.discard()?;
@@ -140,6 +144,10 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         out::print_line(serde_json::to_string_pretty(&summary)?)?;
     } else {
         out::print(&format!("{}\n  outputs              {}\n", summary.table().trim_end(), output.path().display()))?;
+    }
+    if let Some(reason) = safe_mode {
+        out::say(format_args!("safe mode: {reason}"));
+        return Ok(ExitCode::from(SAFE_MODE));
     }
     if let Some(error) = failure {
         return Err(error);
@@ -216,5 +224,5 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         resources: flight.resources(),
         ..SummaryInputs::default()
     };
-    Ok(Flown { summary: Summary::new(inputs, &totals, period), failure })
+    Ok(Flown { summary: Summary::new(inputs, &totals, period), failure, safe_mode: None })
 }

@@ -18,6 +18,8 @@ pub struct Flown {
     pub summary: Summary,
     /// What went wrong.
     pub failure: Option<Error>,
+    /// Why the mission came into safe mode.
+    pub safe_mode: Option<String>,
 }
 
 /// Where bag, tasks and summary go.
@@ -76,6 +78,13 @@ impl OutputFolder {
         };
         let path = self.path.join("mission.toml");
         fs::write(&path, toml::to_string(&mission)?).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+
+    /// Makes the folder in which nodes keep what they need to go on when they are started again.
+    pub fn make_state_folder(&self) -> Result<PathBuf> {
+        let path = self.path.join("state");
+        fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
         Ok(path)
     }
 

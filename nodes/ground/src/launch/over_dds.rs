@@ -1,5 +1,6 @@
 //! A mission over DDS: four nodes and the recorder, each a process of its own.
 
+use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -10,17 +11,19 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::messages::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
-use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph};
+use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
 use swath_sim::model::Model;
 use swath_sim::time::Tick;
 
-use super::fleet::Fleet;
+use super::fleet::{Event, Fleet, Happened};
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
-use swath_mission::alarms::conditions::{Report, report_all};
+use swath_mission::alarms::conditions::{Report, of_plan, report_all};
 use swath_mission::alarms::{Board, Entry, Key};
+use swath_mission::faults::grammar::{Failure, Process};
+use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
-use swath_mission::guarded::{Deciders, Policies, made_instead};
+use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
@@ -31,6 +34,10 @@ const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long the last summary of the requests may take.
 const SUMMARY_TIMEOUT: Duration = Duration::from_secs(5);
 const WAIT: Duration = Duration::from_millis(100);
+/// How long nodes that are started again at the very end may take to be there.
+const WHOLE_TIMEOUT: Duration = Duration::from_secs(20);
+/// After so many losses of late another planner decides in the planner's place.
+const PLANNER_LOSSES: u32 = 3;
 
 /// What there is besides the nodes that fly.
 #[derive(Clone, Copy)]
@@ -52,17 +59,16 @@ pub fn fly(
 ) -> Result<Flown> {
     let mut launcher = Launcher::start(mission, ros)?;
     let namespace = launcher.node.names().namespace().to_owned();
-    let mut fleet = Fleet::default();
+    let manifest_data = manifest_data(mission, &namespace, policies);
+    let mut fleet = Fleet::new(&mission.supervision);
     let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
         let (manifest, output) = (text(mission_file)?, text(&bag)?);
-        let words = ["record", "--use-sim-time", "--own-mission-only", "--manifest", &manifest, "--output", &output];
-        let words: Vec<String> =
-            words.map(str::to_owned).into_iter().chain(manifest_data(mission, &namespace, policies)).collect();
-        let words: Vec<String> =
-            words.into_iter().chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
-        fleet.start(graph::RECORDER, "swath-bag", &words, true)?;
+        let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
+        let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
+        let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
+        fleet.start(graph::RECORDER, "swath-bag", &words)?;
         fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
     }
     if let Some(address) = wishes.console {
@@ -88,6 +94,7 @@ pub fn fly(
     };
     // The first of them is the cause of the others.
     let failure = watched.err().or(unrecorded).or(ended.err());
+    let safe_mode = launcher.safe_mode.take();
     let model = mission.model()?;
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
@@ -103,7 +110,7 @@ pub fn fly(
         nodes,
         resources: None,
     };
-    Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure })
+    Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
 }
 
 /// What the manifest of the bag tells besides the mission.
@@ -139,14 +146,15 @@ fn start_nodes(
     wishes: Wishes,
 ) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
+    let keep = format!("keep:={}", text(&output.make_state_folder()?)?);
     let words = |extra: &[String]| {
-        let own = ["--ros-args", "-p", &mission].map(str::to_owned);
+        let own = ["--ros-args", "-p", &mission, "-p", &keep].map(str::to_owned);
         own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
-    fleet.start_and_keep(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
+    fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
     for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
-        fleet.start(name, program, &words(&[]), false)?;
+        fleet.start(name, program, &words(&[]))?;
     }
     let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
     if wishes.record {
@@ -156,7 +164,7 @@ fn start_nodes(
         peers.push(graph::CONSOLE);
     }
     let wait_for = ["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
-    fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for), false)
+    fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for))
 }
 
 /// The words after `--ros-args` that put a node into a namespace.
@@ -205,6 +213,10 @@ struct Launcher {
     /// What nodes said of alarms. The journal is made of it at the end, because what two nodes say of one tick comes in
     /// any order.
     reports: Vec<Report>,
+    /// What is ordered to befall the recorder, which knows of no mission.
+    recorder_faults: VecDeque<(Scheduled, Failure)>,
+    /// Why the mission is, or ended, in safe mode.
+    safe_mode: Option<String>,
 }
 
 /// How far the mission has come.
@@ -235,7 +247,9 @@ impl Launcher {
             last_summary: None,
             paced: mission.pace > 0.0,
             stamper: Stamper::new(mission.epoch_unix_s, model.period),
-            reports: Vec::new(),
+            reports: of_plan(&mission.faults, model.period),
+            recorder_faults: mission.faults.of(Process::Recorder, model.period).into(),
+            safe_mode: None,
             model,
             node,
         })
@@ -246,7 +260,7 @@ impl Launcher {
         let mut progress = Progress::new(self.horizon, self.model.period);
         let outcome = self.follow(fleet, output, &mut progress);
         progress.finish();
-        let over = outcome.and_then(|()| self.wait_for_the_ground(output));
+        let over = outcome.and_then(|()| self.wait_for_the_ground(fleet, output));
         // What had come until then is kept.
         over.or_else(|error| {
             self.log.give_up();
@@ -285,7 +299,7 @@ impl Launcher {
                 progress.status(Tick(status.tick), phase, &status.strip_name, status.attitude_error, self.log.totals());
             }
             self.take_rest(output)?;
-            fleet.check()?;
+            self.mind(fleet)?;
             if !self.paced && last_news.elapsed() > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
             }
@@ -323,6 +337,71 @@ impl Launcher {
         Ok(())
     }
 
+    /// Looks after the processes: before the mission has begun none may be lost, then each is started again.
+    fn mind(&mut self, fleet: &mut Fleet) -> Result<()> {
+        if self.flown.is_none() {
+            fleet.check()?;
+        }
+        for event in fleet.supervise()? {
+            self.note(fleet, event)?;
+        }
+        let now = self.stamper.tick_from(&stamp(fleet.now_ns()));
+        match self.recorder_faults.pop_front_if(|(it, _)| it.from <= now) {
+            Some((_, Failure::Kill)) => fleet.kill(graph::RECORDER),
+            Some((_, Failure::Hang)) => fleet.freeze(graph::RECORDER),
+            None => Ok(()),
+        }
+    }
+
+    /// What has become of a process: tells the alarms, and what comes of it.
+    fn note(&mut self, fleet: &mut Fleet, Event { node, what }: Event) -> Result<()> {
+        let tick = self.stamper.tick_from(&stamp(fleet.now_ns()));
+        let mut tell = |name: &str, wrong: bool, text: &str| {
+            let key = Key::new(graph::LAUNCHER, name);
+            self.reports.push(Report { tick, key, wrong, text: text.to_owned() });
+        };
+        let lost = format!("{node} lost");
+        match what {
+            Happened::Silent(time) => {
+                tracing::warn!("node {node} gives no sign of life for {} s", time.as_secs_f64());
+            }
+            // The plan tells of what was ordered.
+            Happened::Lost { by_order: true, .. } | Happened::Back { by_order: true } => {}
+            Happened::Lost { how, times, .. } => {
+                tell(&lost, true, &how);
+                if node == graph::PLANNER && times >= PLANNER_LOSSES {
+                    tell("planner replaced", true, &format!("{how}; {} takes over", fallback()));
+                    fleet.set_extra(&node, &[format!("planner:={}", fallback())]);
+                }
+            }
+            Happened::Back { .. } => tell(&lost, false, "it is there again"),
+            Happened::GivenUp { how } => {
+                let reason = format!("{how}, as often before: it is not started again");
+                tell(&lost, true, &reason);
+                return self.give_up(fleet, &node, tick, reason);
+            }
+        }
+        Ok(())
+    }
+
+    /// A node was lost too often: a planner that only holds stands in for the planner, the recorder can be done without,
+    /// and without another one the mission ends.
+    fn give_up(&mut self, fleet: &mut Fleet, node: &str, tick: Tick, reason: String) -> Result<()> {
+        tracing::error!("{reason}");
+        if !graph::FLIGHT_NODES.contains(&node) {
+            return Ok(());
+        }
+        let key = Key::new(graph::LAUNCHER, "safe mode");
+        self.reports.push(Report { tick, key, wrong: true, text: reason.clone() });
+        let again = self.safe_mode.replace(reason.clone()).is_some();
+        if node != graph::PLANNER || again {
+            bail!("{reason}");
+        }
+        fleet.set_extra(node, &[format!("planner:={}", fallback()), "mode:=hold".to_owned()]);
+        fleet.pardon(node);
+        Ok(())
+    }
+
     /// What happened to the alarms of a mission that has ended.
     fn journal(&mut self, end: Tick) -> Vec<Entry> {
         let mut board = Board::new(self.model.period);
@@ -332,7 +411,16 @@ impl Launcher {
     }
 
     /// Waits for the last rewards and the last summary of the request manager.
-    fn wait_for_the_ground(&mut self, output: &mut OutputFolder) -> Result<()> {
+    fn wait_for_the_ground(&mut self, fleet: &mut Fleet, output: &mut OutputFolder) -> Result<()> {
+        let whole_by = Instant::now() + WHOLE_TIMEOUT;
+        loop {
+            self.mind(fleet)?;
+            if fleet.is_whole() || Instant::now() > whole_by {
+                break;
+            }
+            self.take_rest(output)?;
+            self.node.wait(WAIT)?;
+        }
         let end = self.flown.map_or(Tick(0), |flown| flown.end);
         let deadline = Instant::now() + SUMMARY_TIMEOUT;
         let behind = |it: &Self| it.last_summary.as_ref().is_none_or(|summary| summary.tick < end.0) || it.log.waits();

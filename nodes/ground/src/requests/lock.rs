@@ -13,11 +13,11 @@ pub struct StoreLock {
 }
 
 impl StoreLock {
-    /// Takes a store, which need not exist, for this process.
+    /// Takes a store, which need not exist, for this process. One that `replaces` another does not wait for its end.
     ///
     /// # Errors
     /// When another request manager has it, whatever its domain, or the file system cannot lock.
-    pub fn take(store: &Path) -> Result<Self> {
+    pub fn take(store: &Path, replaces: bool) -> Result<Self> {
         let mut path = OsString::from(store);
         path.push(".lock");
         let failed = || format!("store {}: cannot lock {}", store.display(), Path::new(&path).display());
@@ -25,6 +25,8 @@ impl StoreLock {
         let file = open.with_context(failed)?;
         match file.try_lock() {
             Ok(()) => Ok(Self { _file: file }),
+            // The one before is stopped and keeps its lock; the store does not take from it any more.
+            Err(TryLockError::WouldBlock) if replaces => Ok(Self { _file: file }),
             Err(TryLockError::WouldBlock) => {
                 bail!("store {}: another request manager writes it", store.display())
             }
@@ -41,10 +43,11 @@ mod tests {
     fn a_store_has_one_writer_at_a_time_and_is_free_afterwards() {
         let folder = tempfile::tempdir().unwrap();
         let store = folder.path().join("requests.sqlite");
-        let held = StoreLock::take(&store).unwrap();
-        let error = StoreLock::take(&store).unwrap_err().to_string();
+        let held = StoreLock::take(&store, false).unwrap();
+        let error = StoreLock::take(&store, false).unwrap_err().to_string();
         assert!(error.contains("requests.sqlite: another request manager writes it"), "{error}");
+        StoreLock::take(&store, true).unwrap();
         drop(held);
-        StoreLock::take(&store).unwrap();
+        StoreLock::take(&store, false).unwrap();
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rusqlite::backup::Backup;
-use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row};
+use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row, TransactionBehavior};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
@@ -50,6 +50,12 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// Another request manager has taken the file over.
+    #[error("store {path}: another request manager has taken it over")]
+    TakenOver {
+        /// The file.
+        path: PathBuf,
+    },
     /// A value in the file makes no sense.
     #[error("store {path}: request {id} has {what}")]
     Value {
@@ -74,6 +80,8 @@ const PAGES_AT_ONCE: i32 = 4096;
 pub struct Store {
     connection: Connection,
     path: PathBuf,
+    /// Number of this writer among all that the file has had; whoever opened it last writes it.
+    writer: i64,
 }
 
 /// Everything that a request manager takes up again.
@@ -123,12 +131,12 @@ pub enum Durability {
 
 impl Store {
     /// Opens a store for writing, or makes it; a file of an earlier schema is brought up to date. `mission` tells
-    /// missions apart.
+    /// missions apart. From then on whoever opened it before cannot write it any more.
     ///
     /// # Errors
     /// When the file cannot be used, comes from a later version, or belongs to another mission.
     pub fn open(path: &Path, mission: &str) -> Result<Self, StoreError> {
-        let store = Self::connect(path, OpenFlags::default())?;
+        let mut store = Self::connect(path, OpenFlags::default())?;
         store.migrate()?;
         store.run("PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=2000; PRAGMA foreign_keys=ON;")?;
         let sql = |source| store.error(source);
@@ -141,6 +149,9 @@ impl Store {
                 store.connection.execute(insert, [mission]).map_err(sql)?;
             }
         }
+        let claim = "INSERT INTO settings (key, value) VALUES ('writer', '1')
+            ON CONFLICT (key) DO UPDATE SET value = CAST(value AS INTEGER) + 1 RETURNING CAST(value AS INTEGER)";
+        store.writer = store.connection.query_row(claim, [], |row| row.get(0)).map_err(sql)?;
         Ok(store)
     }
 
@@ -168,7 +179,7 @@ impl Store {
         let connection = Connection::open_with_flags(path, flags).map_err(error)?;
         connection.busy_timeout(BUSY_TIMEOUT).map_err(error)?;
         connection.set_prepared_statement_cache_capacity(32);
-        Ok(Self { connection, path: path.to_owned() })
+        Ok(Self { connection, path: path.to_owned(), writer: 0 })
     }
 
     /// Where the file is.
@@ -209,7 +220,7 @@ impl Store {
     /// count as taken.
     ///
     /// # Errors
-    /// When they cannot be written; then none of them is.
+    /// When they cannot be written, or another one has opened the store for writing since; then none of them is.
     pub fn write<'a>(
         &mut self,
         entries: impl Iterator<Item = &'a Entry>,
@@ -217,15 +228,21 @@ impl Store {
         durability: Durability,
     ) -> Result<(), StoreError> {
         let path = self.path.clone();
-        self.write_transaction(entries, progress, durability).map_err(|source| StoreError::Sqlite { path, source })
+        match self.write_transaction(entries, progress, durability) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(StoreError::TakenOver { path }),
+            Err(source) => Err(StoreError::Sqlite { path, source }),
+        }
     }
+
+    /// Whether it was written: it is not once another one writes here.
 
     fn write_transaction<'a>(
         &mut self,
         entries: impl Iterator<Item = &'a Entry>,
         progress: &Progress,
         durability: Durability,
-    ) -> rusqlite::Result<()> {
+    ) -> rusqlite::Result<bool> {
         self.connection.pragma_update(
             None,
             "synchronous",
@@ -234,7 +251,11 @@ impl Store {
                 Durability::Machine => "FULL",
             },
         )?;
-        let transaction = self.connection.transaction()?;
+        let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        let writer = "SELECT CAST(value AS INTEGER) FROM settings WHERE key = 'writer'";
+        if transaction.query_row(writer, [], |row| row.get::<_, i64>(0))? != self.writer {
+            return Ok(false);
+        }
         for entry in entries {
             match entry {
                 Entry::Added(added) => insert_request(&transaction, added)?,
@@ -245,7 +266,8 @@ impl Store {
             }
         }
         write_progress(&transaction, progress)?;
-        transaction.commit()
+        transaction.commit()?;
+        Ok(true)
     }
 
     /// Reads everything that a request manager takes up again.

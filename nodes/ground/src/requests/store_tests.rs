@@ -180,3 +180,25 @@ fn a_store_of_the_first_schema_is_brought_up_to_date() {
     let count: i64 = raw.query_row(index, [], |row| row.get(0)).unwrap();
     assert_eq!((version, count), (3, 1));
 }
+
+/// As when one is stopped, replaced, and goes on.
+#[test]
+fn whoever_opened_a_store_before_cannot_write_it_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("store.sqlite");
+    let mut stopped = Store::open(&path, "mission").unwrap();
+    let mut logic = busy(&mut stopped);
+    let mut fresh = Store::open(&path, "mission").unwrap();
+    let before = fresh.snapshot().unwrap();
+    logic.submit(requests(1).remove(0), logic.now()).unwrap();
+    let entries = logic.take_journal();
+    assert!(!entries.is_empty());
+    let progress = logic.progress();
+    let error = stopped.write(entries.iter(), &progress, Durability::Machine).unwrap_err();
+    assert!(error.to_string().ends_with("another request manager has taken it over"), "{error}");
+    let after = fresh.snapshot().unwrap();
+    let known = before.requests.len();
+    assert_eq!((after.requests, after.progress), (before.requests, before.progress));
+    fresh.write(entries.iter(), &progress, Durability::Machine).unwrap();
+    assert_eq!(fresh.snapshot().unwrap().requests.len(), known + 1);
+}

@@ -27,6 +27,8 @@ use swath_node::program::{Parameter, Program};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
+/// How long the last messages before a fault by order may take to arrive.
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// Requests of long calls that are taken before the mission is looked at again.
 const SLICE: usize = 100;
 
@@ -98,7 +100,7 @@ impl RequestNode {
         } else {
             (path, None)
         };
-        let lock = StoreLock::take(&path)?;
+        let lock = StoreLock::take(&path, base.node.epoch() > 0)?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let logic = take_up(&base, &mut store)?;
@@ -138,6 +140,10 @@ impl RequestNode {
     fn turn(&mut self) -> Result<()> {
         let mut outgoing = Vec::new();
         while let Some(point) = self.points.take()? {
+            if self.base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
+                let _ = self.results.flush(FLUSH_TIMEOUT);
+                self.base.strike();
+            }
             let offer = self.offer(&point)?;
             outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
             outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));

@@ -105,6 +105,15 @@ pub const DEFINITIONS: &[Definition] = &[
             "look at the reason; choose another planner if it stays",
         ],
     ),
+    lasting(
+        "safe mode",
+        Severity::Critical,
+        [
+            "a node was lost more often than it is started again",
+            "the attitude is held, nothing is imaged; what was acknowledged is kept",
+            "look at the node's log; let the planner choose again when the cause is mended: `swath planner mode autonomous`",
+        ],
+    ),
     moment(
         "planner late",
         Severity::Warn,

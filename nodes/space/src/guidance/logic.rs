@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 use swath_sim::model::Model;
-use swath_sim::task::{Task, TaskRecord};
+use swath_sim::task::{Task, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
 use swath_sim::vehicle::flight::Situation;
@@ -87,6 +87,8 @@ pub enum Effect {
     Command(Command),
     /// A task is wanted; the tick's command follows when it has come.
     Decide(Box<DecisionPoint>),
+    /// What was ordered befalls guidance before it looks at its next state.
+    Strike,
 }
 
 /// The command of a tick, and what it rests on.
@@ -104,6 +106,39 @@ pub struct Command {
     pub remaining: u32,
 }
 
+/// What a guidance must know to go on where another one was.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Kept {
+    /// Number of the task in hand, or wanted.
+    pub task: u64,
+    /// The task in hand, as if it were cut short when it began.
+    pub flying: Option<FinishedTask>,
+    /// The task that ended where one was wanted.
+    pub finished: Option<FinishedTask>,
+    /// The last task that was to image.
+    pub last_imaging: Option<FinishedTask>,
+}
+
+/// When a guidance was lost by order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lost {
+    /// Tick of the first state that it did not look at.
+    pub at: Tick,
+    /// Tick of the first state that the next one looks at.
+    pub back: Tick,
+    /// Whether that state is waited for: it is sent again and again.
+    pub waits: bool,
+}
+
+/// What was before a guidance that was started again.
+#[derive(Clone, Debug)]
+struct Before {
+    flying: Option<FinishedTask>,
+    lost: Option<Lost>,
+    /// Tick of the first state that was looked at.
+    first: Option<Tick>,
+}
+
 /// The guidance node's state.
 #[derive(Clone, Debug)]
 pub struct GuidanceLogic {
@@ -119,8 +154,16 @@ pub struct GuidanceLogic {
     /// The state at which a task is wanted, then states that came meanwhile.
     waiting: VecDeque<StateSample>,
     latest: Option<Command>,
+    /// The command before the latest one.
+    earlier: Option<Command>,
     torque_pending: Vector3<f64>,
     last_imaging: Option<FinishedTask>,
+    /// The task that ended where one is wanted.
+    finished: Option<FinishedTask>,
+    /// There is something where another guidance flew before.
+    before: Option<Before>,
+    /// State at which it is struck.
+    strikes_at: Option<Tick>,
     /// Number of a task in hand that is given up at the next state.
     aborted: Option<u64>,
     /// Tasks that did not come in time.
@@ -142,8 +185,12 @@ impl GuidanceLogic {
             name: String::new(),
             waiting: VecDeque::new(),
             latest: None,
+            earlier: None,
             torque_pending: Vector3::zeros(),
             last_imaging: None,
+            finished: None,
+            before: None,
+            strikes_at: None,
             aborted: None,
             late: 0,
         }
@@ -175,6 +222,39 @@ impl GuidanceLogic {
         self
     }
 
+    /// What was ordered befalls it before it looks at the state at `tick`.
+    #[must_use]
+    pub fn struck_at(mut self, tick: Option<Tick>) -> Self {
+        self.strikes_at = tick;
+        self
+    }
+
+    /// Goes on where a guidance was that is lost: what it flew counts as interrupted.
+    #[must_use]
+    pub fn taking_up(mut self, kept: Kept, lost: Option<Lost>) -> Self {
+        self.task = kept.task;
+        self.finished = kept.finished;
+        self.last_imaging = kept.last_imaging;
+        self.before = Some(Before { flying: kept.flying, lost, first: None });
+        self
+    }
+
+    /// What another guidance must know to go on should this one be lost.
+    #[must_use]
+    pub fn kept(&self) -> Kept {
+        let flying = self.executive.task().map(|(task, start)| FinishedTask {
+            record: TaskRecord::new(self.task, task, start, start, TaskOutcome::NOT_BEGUN),
+            name: self.name.clone(),
+        });
+        Kept { task: self.task, flying, finished: self.finished.clone(), last_imaging: self.last_imaging.clone() }
+    }
+
+    /// What changes whenever [`Self::kept`] does: number of the task, and whether it is in hand.
+    #[must_use]
+    pub fn marks(&self) -> (u64, bool) {
+        (self.task, self.executive.task().is_some())
+    }
+
     /// What came to be known of wheels and sensors since the last call, each with its tick.
     pub fn take_changes(&mut self) -> Vec<(Tick, Health)> {
         self.executive.take_changes()
@@ -182,10 +262,14 @@ impl GuidanceLogic {
 
     /// Takes a state. A state seen before brings its command again, so that a lost sample stops nothing.
     pub fn on_state(&mut self, state: StateSample) -> Vec<Effect> {
+        if let Some(effects) = self.mind_the_one_before(state.tick) {
+            return effects;
+        }
         if let Some(latest) = &self.latest
             && state.tick <= latest.tick
         {
-            return if state.tick == latest.tick { vec![Effect::Command(latest.clone())] } else { Vec::new() };
+            let known = self.latest.iter().chain(&self.earlier).find(|command| command.tick == state.tick);
+            return known.map(|command| Effect::Command(command.clone())).into_iter().collect();
         }
         if !self.waiting.is_empty() {
             if self.waiting.iter().all(|waiting| waiting.tick < state.tick) {
@@ -194,6 +278,25 @@ impl GuidanceLogic {
             return Vec::new();
         }
         self.process(state)
+    }
+
+    /// What is answered to a state that is not looked at, because another guidance flew before.
+    fn mind_the_one_before(&mut self, tick: Tick) -> Option<Vec<Effect>> {
+        let before = self.before.as_mut()?;
+        let first = match before.first {
+            Some(first) => first,
+            None => {
+                let wanted = before.lost.map_or(tick, |lost| lost.back.min(self.horizon));
+                if tick < wanted || (tick > wanted && before.lost.is_some_and(|lost| lost.waits)) {
+                    return Some(Vec::new());
+                }
+                before.first = Some(tick);
+                tick
+            }
+        };
+        // Nobody knows any more what would have been commanded there.
+        let idle = || Command { tick, task: self.task, guidance: GuidanceTick::IDLE, has_strip: false, remaining: 0 };
+        (tick < first).then(|| vec![Effect::Command(idle())])
     }
 
     /// Takes the task wanted.
@@ -226,6 +329,15 @@ impl GuidanceLogic {
         self.begin(TaskOrder { task: self.task, kind: Task::Wait { ticks: self.hold }, name: String::new() }, 0)
     }
 
+    /// There is no planner for `ticks`: holds the attitude for a while, then asks.
+    pub fn on_absence(&mut self, ticks: u32) -> Vec<Effect> {
+        if self.wanted().is_none() {
+            return Vec::new();
+        }
+        let kind = Task::Wait { ticks: self.hold.min(ticks).max(1) };
+        self.begin(TaskOrder { task: self.task, kind, name: String::new() }, 0)
+    }
+
     /// A task is no longer wanted: it ends at the next state, unless imaging has begun. Returns whether it ends.
     pub fn on_abort(&mut self, task: u64) -> bool {
         let slewing = match (self.executive.number(), &self.latest) {
@@ -243,6 +355,7 @@ impl GuidanceLogic {
         let Some(state) = states.pop_front() else { return Vec::new() };
         self.executive.begin(order.task, order.kind, delay, &sight(&state));
         self.name = order.name;
+        self.finished = None;
         let mut effects = vec![self.fly(&state)];
         for state in states {
             effects.extend(self.on_state(state));
@@ -251,10 +364,19 @@ impl GuidanceLogic {
     }
 
     fn process(&mut self, state: StateSample) -> Vec<Effect> {
+        if self.strikes_at.is_some_and(|at| state.tick >= at) {
+            return vec![Effect::Strike];
+        }
+        let lost = self.before.as_mut().and_then(|before| Some((before.flying.take()?, before.lost)));
         let aborted = self.aborted.take().is_some_and(|task| self.may_end(task, &state));
         let ended = aborted || self.executive.end().is_some_and(|end| state.tick >= end);
         let over = state.tick >= self.horizon;
-        let finished = if ended || over { self.finish(&state) } else { None };
+        let finished = match lost {
+            Some((task, lost)) => Some(self.interrupted(task, lost.map_or(state.tick, |lost| lost.at))),
+            None if ended || over => self.finish(&state),
+            None => None,
+        };
+        self.finished = finished.or(self.finished.take());
         if self.executive.task().is_some() {
             return vec![self.fly(&state)];
         }
@@ -277,9 +399,20 @@ impl GuidanceLogic {
             state: StateSample { body, ..state },
             situation,
             mission_over: over,
-            finished,
+            finished: self.finished.clone(),
             last_imaging: self.last_imaging.clone(),
         }))]
+    }
+
+    /// The task that a lost guidance flew, cut short where that was lost.
+    fn interrupted(&mut self, mut task: FinishedTask, at: Tick) -> FinishedTask {
+        task.record.end = at;
+        task.record.start = task.record.start.min(at);
+        self.task = task.record.task + 1;
+        if task.record.strip.is_some() {
+            self.last_imaging = Some(task.clone());
+        }
+        task
     }
 
     /// Whether a task is in hand whose imaging has not begun at a state.
@@ -315,7 +448,7 @@ impl GuidanceLogic {
             None => (false, 0),
         };
         let command = Command { tick: state.tick, task: self.task, guidance, has_strip, remaining };
-        self.latest = Some(command.clone());
+        self.earlier = self.latest.replace(command.clone());
         Effect::Command(command)
     }
 }
@@ -323,138 +456,4 @@ impl GuidanceLogic {
 /// A state as the executive is told of it.
 fn sight(state: &StateSample) -> Sight<'_> {
     Sight { now: state.tick, r_BN_N: state.r_BN_N, measured: &state.body, truth: state.truth.as_ref() }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use swath_sim::config::SimConfig;
-    use swath_sim::learn::episode::{Env, EpisodeConfig};
-    use swath_sim::planner::{Heuristic, Planner};
-    use swath_sim::rng;
-    use swath_sim::task::TaskOutcome;
-    use swath_sim::vehicle::errors::PlantErrors;
-    use swath_sim::vehicle::initial::InitialState;
-    use swath_sim::vehicle::spacecraft::Spacecraft;
-
-    use super::*;
-    use crate::spacecraft::logic::SpacecraftLogic;
-
-    const SEED: u64 = 4;
-
-    fn model() -> Model {
-        Model::new(SimConfig::default()).unwrap()
-    }
-
-    fn satellite(model: &Model) -> Spacecraft {
-        let initial = InitialState::draw(&model.config, &mut rng::stream(SEED, rng::INITIAL_STATE));
-        Spacecraft::new(model, &initial)
-    }
-
-    /// Spacecraft and guidance as two nodes with two ticks under way, against the environment in one process.
-    #[test]
-    fn two_nodes_fly_what_the_environment_flies() {
-        for errors in ["none", "noise", "torque-10%,inertia+5%,noise,delay"] {
-            let flown = compare(&errors.parse().unwrap());
-            assert!(flown > 20, "{errors}: only {flown} tasks");
-        }
-    }
-
-    fn compare(errors: &PlantErrors) -> u64 {
-        let model = model();
-        let config = EpisodeConfig { orbits: 0.5, ..EpisodeConfig::evaluation() };
-        let mut env = Env::episode(Arc::new(model.clone()), &config, SEED);
-        env.differ(errors, SEED).unwrap();
-        let mut satellite = satellite(&model);
-        satellite.differ(&model, errors, SEED).unwrap();
-        let mut spacecraft = SpacecraftLogic::new(satellite, env.horizon());
-        let delay = model.period.ticks_ceil(errors.planning_delay_s);
-        let mut guidance = GuidanceLogic::new(model, env.horizon(), 20).with_planning_delay(delay);
-        let mut planner = Heuristic { t_pre_s: 60.0 };
-        let mut expected = None;
-        let mut states = VecDeque::from([spacecraft.sample()]);
-        let mut over = false;
-        while !over {
-            let mut effects = VecDeque::new();
-            if spacecraft.ready() && !spacecraft.done() {
-                states.push_back(spacecraft.advance());
-            }
-            if let Some(state) = states.pop_front() {
-                effects.extend(guidance.on_state(state));
-            }
-            while let Some(effect) = effects.pop_front() {
-                match effect {
-                    Effect::Command(command) => spacecraft.command(command.tick, command.guidance.torque).unwrap(),
-                    Effect::Decide(point) => {
-                        over = point.mission_over;
-                        let decision = planner.decide(&env.context()).unwrap();
-                        assert_eq!(&point.situation, env.context().situation);
-                        assert_eq!(point.finished.as_ref().map(|finished| &finished.record), expected.as_ref());
-                        if over {
-                            break;
-                        }
-                        let kind = decision.to_task(&env.context()).unwrap();
-                        let order = TaskOrder { task: point.task, kind, name: "strip".to_owned() };
-                        expected = Some(env.fly(decision, env.horizon()).unwrap().record);
-                        effects.extend(guidance.on_task(order).unwrap());
-                    }
-                }
-            }
-        }
-        assert!(env.truncated());
-        assert_eq!((spacecraft.missed, guidance.late), (0, 0));
-        guidance.task
-    }
-
-    #[test]
-    fn a_late_task_is_replaced_by_holding_the_attitude() {
-        let model = model();
-        let mut spacecraft = SpacecraftLogic::new(satellite(&model), Tick(100));
-        let mut guidance = GuidanceLogic::new(model, Tick(100), 10);
-        assert!(matches!(guidance.on_state(spacecraft.sample())[..], [Effect::Decide(_)]));
-        assert!(guidance.on_state(spacecraft.advance()).is_empty(), "the next state waits for the task");
-        let effects = guidance.on_deadline();
-        assert!(matches!(effects[..], [Effect::Command(_), Effect::Command(_)]));
-        assert_eq!(guidance.late, 1);
-        let order = TaskOrder { task: 0, kind: Task::Wait { ticks: 5 }, name: String::new() };
-        assert_eq!(guidance.on_task(order), Err(TaskError::NotWanted { task: 0, wanted: None }));
-    }
-
-    #[test]
-    fn a_task_is_given_up_while_slewing_and_not_once_imaging_has_begun() {
-        let model = model();
-        let env = Env::episode(Arc::new(model.clone()), &EpisodeConfig::evaluation(), SEED);
-        let candidate = env.context().candidates[0];
-        for (ticks, given_up) in [(10, true), (60, false)] {
-            let mut spacecraft = SpacecraftLogic::new(satellite(&model), Tick(1000));
-            let mut guidance = GuidanceLogic::new(model.clone(), Tick(1000), 10);
-            guidance.on_state(spacecraft.sample());
-            let kind = Task::Image { id: candidate.id, strip: candidate.strip, t_pre: 40, t_acq: candidate.t_acq };
-            let order = TaskOrder { task: 0, kind, name: "strip".to_owned() };
-            guidance.on_task(order).unwrap();
-            let mut sample = |guidance: &mut GuidanceLogic| {
-                let effects = guidance.on_state(spacecraft.advance());
-                if let Some(Effect::Command(command)) = effects.first() {
-                    spacecraft.command(command.tick, command.guidance.torque).unwrap();
-                }
-                effects
-            };
-            for _ in 1..ticks {
-                sample(&mut guidance);
-            }
-            assert!(!guidance.on_abort(7), "another task");
-            assert_eq!(guidance.on_abort(0), given_up);
-            match &sample(&mut guidance)[..] {
-                [Effect::Decide(point)] => {
-                    let finished = point.finished.as_ref().unwrap();
-                    assert!(given_up);
-                    assert_eq!(finished.record.outcome, TaskOutcome::NOT_BEGUN);
-                    assert_eq!(finished.record.end, Tick(ticks));
-                    assert_eq!(point.last_imaging.as_ref(), Some(finished));
-                }
-                effects => assert!(!given_up, "{effects:?}"),
-            }
-        }
-    }
 }

@@ -1,14 +1,16 @@
 //! Guidance's messages.
 
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
 use swath_msgs::swath_msgs as msg;
 use swath_node::error::MessageError;
-use swath_node::messages::{acquisition, spacecraft_state, vector3};
+use swath_node::messages::{acquisition, spacecraft_state, task_record, vector3};
 use swath_node::stamp::{BODY_FRAME, Stamper};
 use swath_sim::model::Model;
 use swath_sim::task::{FailureReason, Task};
 use swath_sim::world::strip::StripId;
 
-use super::logic::{Command, DecisionPoint, FinishedTask, TaskOrder};
+use super::logic::{Command, DecisionPoint, FinishedTask, Kept, TaskOrder};
 
 /// A task as guidance takes it.
 ///
@@ -104,6 +106,50 @@ pub fn task_result(finished: &FinishedTask) -> msg::TaskResult {
         // Whoever keeps the requests settles it.
         reward: 0.0,
     }
+}
+
+/// What guidance keeps, as it lies in its file.
+#[derive(Serialize, Deserialize)]
+struct KeptTasks {
+    task: u64,
+    flying: Option<msg::TaskResult>,
+    finished: Option<msg::TaskResult>,
+    last_imaging: Option<msg::TaskResult>,
+}
+
+/// The text of what guidance keeps.
+///
+/// # Errors
+/// When a number cannot be written.
+pub fn kept_text(kept: &Kept) -> Result<String> {
+    let of = |task: &Option<FinishedTask>| task.as_ref().map(task_result);
+    let tasks = KeptTasks {
+        task: kept.task,
+        flying: of(&kept.flying),
+        finished: of(&kept.finished),
+        last_imaging: of(&kept.last_imaging),
+    };
+    Ok(serde_json::to_string(&tasks)?)
+}
+
+/// What guidance kept.
+///
+/// # Errors
+/// When the text is not one of [`kept_text`].
+pub fn kept(text: &str) -> Result<Kept> {
+    let tasks: KeptTasks = serde_json::from_str(text).context("what guidance kept cannot be read")?;
+    let of = |result: Option<msg::TaskResult>| {
+        let task = |result: msg::TaskResult| {
+            Ok::<_, MessageError>(FinishedTask { record: task_record(&result)?, name: result.strip_name })
+        };
+        result.map(task).transpose()
+    };
+    Ok(Kept {
+        task: tasks.task,
+        flying: of(tasks.flying)?,
+        finished: of(tasks.finished)?,
+        last_imaging: of(tasks.last_imaging)?,
+    })
 }
 
 /// The task in hand enters a phase.

@@ -1,5 +1,7 @@
 //! The guidance node: it flies the active task.
 
 pub mod logic;
+#[cfg(test)]
+mod logic_tests;
 mod messages;
 pub mod wiring;

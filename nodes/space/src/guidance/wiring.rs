@@ -12,17 +12,25 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::dynamics::BodyState;
 use swath_sim::vehicle::spacecraft::StateSample;
 
-use super::logic::{Command, Effect, GuidanceLogic};
+use super::logic::{Command, Effect, GuidanceLogic, Lost};
 use super::messages;
-use swath_mission::alarms::conditions::of_health;
+use swath_mission::alarms::conditions::{back, of_health};
+use swath_mission::faults::grammar::Process;
+use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::PACED_PATIENCE;
-use swath_node::node::{MissionNode, Severity};
+use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{PACE, Program};
 
 /// How long a question without an answer waits before it is asked again.
 const ASK_AGAIN_AFTER: Duration = Duration::from_millis(500);
 /// Share of a tick's wall-clock time that planning may take in a paced mission.
 const PACED_SHARE: f64 = 0.8;
+/// How long, instead of the mission's deadline, a task is waited for whose planner may be started again on the way.
+const RESTARTED: Duration = Duration::from_secs(45);
+/// How long the last messages before a fault by order may take to arrive.
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
+/// The file in which guidance keeps what is in hand.
+const KEPT: &str = "guidance.json";
 /// Simulated time between two status messages [s].
 const STATUS_PERIOD_S: f64 = 10.0;
 
@@ -64,6 +72,10 @@ struct GuidanceNode {
     status_every: u64,
     deadline: Duration,
     question: Option<Question>,
+    /// When there is no planner, by order.
+    nobody_plans: Vec<Scheduled>,
+    /// Task and whether it was begun, as it was kept last.
+    kept: Option<(u64, bool)>,
     /// Whether something was wrong with wheels or sensors before.
     health_told: bool,
     base: MissionNode,
@@ -88,12 +100,21 @@ impl GuidanceNode {
         } else {
             mission.planning_deadline_s
         };
+        let planner_lost = mission.faults.of(Process::Planner, period);
+        let restarts = !planner_lost.is_empty() || !mission.faults.of(Process::RequestManager, period).is_empty();
+        let deadline = Duration::from_secs_f64(seconds);
+        let deadline = if restarts && pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
         let hold = period.ticks_ceil(mission.hold_s);
         let delay = period.ticks_ceil(mission.plant.planning_delay_s);
         Ok(Self {
-            logic: GuidanceLogic::new((*base.model).clone(), base.horizon, hold)
-                .with_planning_delay(delay)
-                .watching(mission.plant.noisy()),
+            logic: take_up(
+                &base,
+                pace,
+                GuidanceLogic::new((*base.model).clone(), base.horizon, hold)
+                    .with_planning_delay(delay)
+                    .watching(mission.plant.noisy())
+                    .struck_at(base.strikes_at()),
+            )?,
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
             truths: match mission.tells_truth_apart(period) {
                 true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
@@ -108,9 +129,12 @@ impl GuidanceNode {
             aborts: base.node.subscription(&graph::TASK_ABORT)?,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
-            deadline: Duration::from_secs_f64(seconds),
+            deadline,
             question: None,
-            health_told: false,
+            nobody_plans: planner_lost.into_iter().map(|(it, _)| it).collect(),
+            kept: None,
+            // What the one before has told may be over.
+            health_told: base.node.epoch() > 0,
             base,
         })
     }
@@ -209,6 +233,9 @@ impl GuidanceNode {
     }
 
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<()> {
+        if !effects.is_empty() {
+            self.keep()?;
+        }
         for effect in effects {
             match effect {
                 Effect::Command(command) => self.send(&command)?,
@@ -217,8 +244,32 @@ impl GuidanceNode {
                     self.points.publish(&message)?;
                     let now = Instant::now();
                     self.question = (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
+                    self.hold_without_planner(point.state.tick)?;
+                }
+                Effect::Strike => {
+                    let _ = self.points.flush(FLUSH_TIMEOUT);
+                    let _ = self.torques.flush(FLUSH_TIMEOUT);
+                    self.base.strike();
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Where there is no planner, by order, nobody is waited for.
+    fn hold_without_planner(&mut self, now: Tick) -> Result<()> {
+        let Some(it) = self.nobody_plans.iter().find(|it| it.from <= now && now < it.until) else { return Ok(()) };
+        let effects = self.logic.on_absence(it.until.since(now) as u32);
+        self.carry_out(effects)
+    }
+
+    /// Keeps what another guidance must know, when it has changed.
+    fn keep(&mut self) -> Result<()> {
+        let Some(path) = self.base.keeps(KEPT) else { return Ok(()) };
+        let marks = self.logic.marks();
+        if self.kept != Some(marks) {
+            keep(&path, &messages::kept_text(&self.logic.kept())?)?;
+            self.kept = Some(marks);
         }
         Ok(())
     }
@@ -238,4 +289,14 @@ impl GuidanceNode {
         }
         Ok(())
     }
+}
+
+/// Guidance where the one before was, if there was one.
+fn take_up(base: &MissionNode, pace: f64, logic: GuidanceLogic) -> Result<GuidanceLogic> {
+    let Some(text) = base.kept(KEPT)? else { return Ok(logic) };
+    let kept = messages::kept(&text)?;
+    tracing::info!("guidance goes on after task {}", kept.task);
+    // States are sent again in lockstep alone.
+    let lost = base.struck().map(|it| Lost { at: it.from, back: back(&it), waits: pace == 0.0 });
+    Ok(logic.taking_up(kept, lost))
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use swath_mission::orders::action::{Act, Action};
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::{situation, task_record};
@@ -14,24 +14,34 @@ use swath_sim::time::Tick;
 use super::logic::{Planned, PlannerLogic};
 use super::messages;
 use swath_mission::alarms::conditions::of_planner;
-use swath_mission::approval::{Gate, GatedPlanner};
+use swath_mission::approval::{ApprovalConfig, Gate, GatedPlanner, Mode};
+use swath_mission::faults::grammar::Process;
+use swath_mission::faults::plan::Scheduled;
 use swath_mission::guarded::{GuardedPlanner, Policies};
-use swath_node::node::{MissionNode, Severity};
+use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{Parameter, Program};
 
 const PLANNER_PARAMETER: Parameter =
     Parameter { name: "planner", about: "The planner, as mission files name them; the mission's without it." };
+
+const MODE: Parameter =
+    Parameter { name: "mode", about: "autonomous, approve or hold; as it was, or as the mission says, without it." };
+/// The file in which the planner keeps its mode.
+const KEPT: &str = "planner.mode";
 
 /// The node as a program.
 const PROGRAM: Program = Program {
     node: graph::PLANNER,
     name: "swath-planner",
     about: "The planner: chooses the next strip and how long to turn to it",
-    parameters: &[PLANNER_PARAMETER],
+    parameters: &[PLANNER_PARAMETER, MODE],
 };
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
+
+/// How long the last messages before a fault by order may take to arrive.
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Runs the planner node until it is asked to end.
 ///
@@ -61,6 +71,8 @@ struct PlannerNode {
     /// Why another planner decides in its place, as it was told last.
     fault_told: Option<String>,
     now: Tick,
+    /// When there is no planner, by order.
+    away: Vec<Scheduled>,
     base: MissionNode,
 }
 
@@ -68,12 +80,15 @@ impl PlannerNode {
     fn new(base: MissionNode, policies: &Policies) -> Result<Self> {
         let name = Spec::new(PLANNER_PARAMETER.name, base.mission.planner.to_string(), PLANNER_PARAMETER.about);
         let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
+        let mode = Spec::new(MODE.name, String::new(), MODE.about);
+        let mode = base.node.parameters().declare(mode.read_only())?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
         if let Some(warning) = policies.warning(&spec, &base.mission.sim) {
             tracing::warn!("{warning}");
         }
-        let gate = Gate::new(&base.mission.approval, base.model.period);
+        let config = ApprovalConfig { mode: mode_at_start(&base, mode)?, ..base.mission.approval.clone() };
+        let gate = Gate::new(&config, base.model.period);
         let planner = GatedPlanner { gate, planner };
         Ok(Self {
             logic: PlannerLogic::new((*base.model).clone(), planner),
@@ -90,6 +105,7 @@ impl PlannerNode {
             last: None,
             now: Tick(0),
             fault_told: None,
+            away: base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect(),
             base,
         })
     }
@@ -97,6 +113,14 @@ impl PlannerNode {
     fn turn(&mut self) -> Result<()> {
         while let Some(point) = self.points.take()? {
             if point.mission_over {
+                continue;
+            }
+            let tick = Tick(point.tick);
+            if self.base.strikes_at().is_some_and(|at| tick >= at) {
+                let _ = self.decisions.flush(FLUSH_TIMEOUT);
+                self.base.strike();
+            }
+            if self.away.iter().any(|it| it.from <= tick && tick < it.until) {
                 continue;
             }
             // The question again: the answer may have been lost.
@@ -137,11 +161,13 @@ impl PlannerNode {
         let mut taken = Vec::new();
         let (at, initial) = (self.now, self.last.is_none());
         let mut note = |actor: String, act: Act| taken.push(Action { at, initial, actor, reason: String::new(), act });
+        let mut set = None;
         let gate = self.logic.gate_mut();
         self.set_mode.answer_all(|call| match planner_mode(call.mode) {
             Ok(mode) => {
                 tracing::info!("{} sets the mode to {mode:?}", call.actor);
                 gate.set_mode(mode);
+                set = Some(mode);
                 note(call.actor, Act::SetMode(mode));
                 msg::SetPlannerModeResponse { accepted: true, reason: String::new() }
             }
@@ -156,6 +182,9 @@ impl PlannerNode {
             }
             Err(error) => msg::ReviewProposalResponse { reason: error.to_string(), ..Default::default() },
         })?;
+        if let (Some(path), Some(mode)) = (self.base.keeps(KEPT), set) {
+            keep(&path, &serde_json::to_string(&mode)?)?;
+        }
         for action in taken {
             self.actions.publish(&operator_action(&self.base.stamper, &action))?;
         }
@@ -194,4 +223,11 @@ impl PlannerNode {
         self.last = Some(task);
         Ok(())
     }
+}
+
+/// The mode that is asked for, else the one that operators set before this planner was started again, else the mission's.
+fn mode_at_start(base: &MissionNode, asked_for: String) -> Result<Mode> {
+    let text = if asked_for.is_empty() { base.kept(KEPT)? } else { Some(format!("\"{asked_for}\"")) };
+    let Some(text) = text else { return Ok(base.mission.approval.mode) };
+    serde_json::from_str(&text).with_context(|| format!("{text} is not a mode: autonomous, approve or hold"))
 }

@@ -34,6 +34,8 @@ pub struct SpacecraftLogic {
     spacecraft: Spacecraft,
     horizon: Tick,
     commands: BTreeMap<Tick, Vector3<f64>>,
+    /// From which state on there is no guidance by order, and from which on there is one again.
+    without: Vec<(Tick, Tick)>,
     /// Ticks flown without a command because none had come in time.
     pub missed: u64,
 }
@@ -42,7 +44,14 @@ impl SpacecraftLogic {
     /// A spacecraft that stops at `horizon`.
     #[must_use]
     pub fn new(spacecraft: Spacecraft, horizon: Tick) -> Self {
-        Self { spacecraft, horizon, commands: BTreeMap::new(), missed: 0 }
+        Self { spacecraft, horizon, commands: BTreeMap::new(), without: Vec::new(), missed: 0 }
+    }
+
+    /// Between these ticks there is no guidance, by order: the wheels hold no torque where it would have commanded.
+    #[must_use]
+    pub fn without_guidance(mut self, without: Vec<(Tick, Tick)>) -> Self {
+        self.without = without;
+        self
     }
 
     /// Simulated time.
@@ -83,23 +92,40 @@ impl SpacecraftLogic {
     /// Whether the command that the next tick needs has come: that of the tick before this one.
     #[must_use]
     pub fn ready(&self) -> bool {
-        let now = self.now();
-        now == Tick(0) || self.commands.contains_key(&Tick(now.0 - 1))
+        match self.now().0.checked_sub(1).map(Tick) {
+            Some(before) => self.commands.contains_key(&before) || self.is_without(before),
+            None => true,
+        }
+    }
+
+    fn is_without(&self, tick: Tick) -> bool {
+        self.without.iter().any(|&(from, back)| (from..back).contains(&tick))
     }
 
     /// Integrates one tick. The wheels idle when no command has come: the first tick has none, and in a paced mission
     /// guidance may be late.
     pub fn advance(&mut self) -> StateSample {
+        let command = self.next_command();
+        self.advance_by(&command)
+    }
+
+    /// What acts over the next tick: the command that came for it, else nothing [N m].
+    pub fn next_command(&mut self) -> Vector3<f64> {
         let now = self.now();
-        let command = match now.0.checked_sub(1) {
-            Some(before) => self.commands.remove(&Tick(before)).unwrap_or_else(|| {
+        let before = now.0.checked_sub(1).map(Tick);
+        let command = before.filter(|&before| !self.is_without(before)).map(|before| {
+            self.commands.remove(&before).unwrap_or_else(|| {
                 self.missed += 1;
                 Vector3::zeros()
-            }),
-            None => Vector3::zeros(),
-        };
-        self.spacecraft.advance(&command);
+            })
+        });
         self.commands = self.commands.split_off(&now);
+        command.unwrap_or_default()
+    }
+
+    /// Integrates one tick under a command [N m].
+    pub fn advance_by(&mut self, command: &Vector3<f64>) -> StateSample {
+        self.spacecraft.advance(command);
         self.sample()
     }
 }
@@ -132,6 +158,22 @@ mod tests {
         assert_eq!(spacecraft.missed, 0);
         assert_eq!(spacecraft.advance().torque_applied, Vector3::zeros());
         assert_eq!(spacecraft.missed, 1);
+    }
+
+    #[test]
+    fn without_guidance_no_command_is_waited_for() {
+        let mut spacecraft = spacecraft().without_guidance(vec![(Tick(1), Tick(3))]);
+        let torque = Vector3::new(0.1, -0.2, 0.3);
+        spacecraft.command(Tick(0), torque).unwrap();
+        spacecraft.advance();
+        assert_eq!(spacecraft.advance().torque_applied, torque);
+        for now in [2, 3] {
+            assert_eq!(spacecraft.now(), Tick(now));
+            assert!(spacecraft.ready());
+            assert_eq!(spacecraft.advance().torque_applied, Vector3::zeros());
+        }
+        assert!(!spacecraft.ready(), "the command of tick 3 comes from the next guidance");
+        assert_eq!(spacecraft.missed, 0);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The spacecraft node: dynamics, wheels, orbit and the clock.
 
+pub mod journal;
 pub mod logic;
 mod telemetry;
 pub mod wiring;

@@ -1,6 +1,7 @@
 //! The spacecraft in standard messages, for ROS tools: frames, wheels, sub-satellite point.
 
 use anyhow::Result;
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use swath_msgs::geometry_msgs::{Quaternion, Transform, TransformStamped};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix, NavSatStatus};
 use swath_msgs::tf2_msgs::TFMessage;
@@ -11,7 +12,7 @@ use swath_sim::world::frames::latitude_longitude_deg;
 use swath_node::messages::vector3;
 use swath_node::node::MissionNode;
 use swath_node::program::Parameter;
-use swath_node::stamp::{BODY_FRAME, EARTH_FRAME, INERTIAL_FRAME};
+use swath_node::stamp::{BODY_FRAME, EARTH_FRAME, INERTIAL_FRAME, ORBIT_FRAME};
 use swath_sim::vehicle::spacecraft::StateSample;
 
 /// How often.
@@ -63,7 +64,7 @@ impl Telemetry {
             ..JointState::default()
         })?;
         let r = sample.r_BN_N;
-        let r_E = nalgebra::Vector3::new(cos * r.x + sin * r.y, cos * r.y - sin * r.x, r.z);
+        let r_E = Vector3::new(cos * r.x + sin * r.y, cos * r.y - sin * r.x, r.z);
         let (latitude, longitude) = latitude_longitude_deg(&r_E);
         let mut fix = NavSatFix {
             header: base.stamper.header(sample.tick, EARTH_FRAME),
@@ -90,12 +91,43 @@ fn frames(base: &MissionNode, sample: &StateSample, cos: f64, sin: f64) -> TFMes
     // Half-angle from the angle's cosine and sine.
     let half = 0.5 * sin.atan2(cos);
     let earth = TransformStamped {
-        header,
+        header: header.clone(),
         child_frame_id: base.stamper.frame(EARTH_FRAME),
         transform: Transform {
             rotation: Quaternion { x: 0.0, y: 0.0, z: half.sin(), w: half.cos() },
             ..Transform::default()
         },
     };
-    TFMessage { transforms: vec![body, earth] }
+    let orbit = TransformStamped {
+        header,
+        child_frame_id: base.stamper.frame(ORBIT_FRAME),
+        transform: Transform { translation: vector3(&sample.r_BN_N), rotation: hill(&sample.r_BN_N, &sample.v_BN_N) },
+    };
+    TFMessage { transforms: vec![body, earth, orbit] }
+}
+
+/// Orientation of the orbit's frame in the inertial one, by position [m] and velocity [m/s] there.
+fn hill(r_BN_N: &Vector3<f64>, v_BN_N: &Vector3<f64>) -> Quaternion {
+    let radial = r_BN_N.normalize();
+    let normal = r_BN_N.cross(v_BN_N).normalize();
+    let axes = Rotation3::from_basis_unchecked(&[radial, normal.cross(&radial), normal]);
+    let q = UnitQuaternion::from_rotation_matrix(&axes);
+    Quaternion { x: q.i, y: q.j, z: q.k, w: q.w }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_orbit_s_frame_points_up_and_along_the_orbit() {
+        let Quaternion { x, y, z, w } = hill(&Vector3::new(0.0, 7e6, 0.0), &Vector3::new(-5e3, 0.0, 5e3));
+        let orbit = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        let forward = Vector3::new(-1.0, 0.0, 1.0).normalize();
+        for (axis, expected) in
+            [(Vector3::x(), Vector3::y()), (Vector3::y(), forward), (Vector3::z(), Vector3::y().cross(&forward))]
+        {
+            assert!((orbit * axis - expected).norm() < 1e-12, "{axis}");
+        }
+    }
 }

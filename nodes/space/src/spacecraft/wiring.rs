@@ -10,8 +10,11 @@ use swath_node::messages::spacecraft_state;
 use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 
+use super::journal::Journal;
 use super::logic::SpacecraftLogic;
 use super::telemetry::{self, Telemetry};
+use swath_mission::alarms::conditions::back;
+use swath_mission::faults::grammar::Process;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::node::{MissionNode, Severity};
 use swath_node::program::{PACE, Parameter, Program};
@@ -59,6 +62,8 @@ struct SpacecraftNode {
     commands: Subscription<WheelTorque>,
     telemetry: Telemetry,
     unanswered: VecDeque<StateSample>,
+    /// There is one where somebody would start the spacecraft again.
+    journal: Option<Journal>,
     pace: f64,
     peers: Vec<String>,
     peer_timeout: Duration,
@@ -77,8 +82,14 @@ impl SpacecraftNode {
         let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
         let telemetry = Telemetry::new(&base)?;
         parameters.check_given()?;
+        let lost = base.mission.faults.of(Process::Guidance, base.model.period);
+        let without = lost.iter().map(|(it, _)| (it.from, back(it))).collect();
+        let logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
+        let (journal, unanswered, logic) = take_up(&base, logic.without_guidance(without))?;
         Ok(Self {
-            logic: SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon),
+            logic,
+            journal,
+            unanswered,
             clock: base.node.publisher(&graph::CLOCK)?,
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
             truths: match base.mission.tells_truth_apart(base.model.period) {
@@ -87,7 +98,6 @@ impl SpacecraftNode {
             },
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
             telemetry,
-            unanswered: VecDeque::new(),
             pace,
             peers,
             peer_timeout: Duration::from_secs_f64(timeout),
@@ -101,6 +111,7 @@ impl SpacecraftNode {
     }
 
     fn fly(&mut self) -> Result<()> {
+        self.resend()?;
         let first = self.logic.sample();
         self.publish(&first)?;
         if self.pace > 0.0 {
@@ -122,8 +133,7 @@ impl SpacecraftNode {
             self.take_commands()?;
             let before = self.logic.now();
             while self.logic.ready() && !self.logic.done() {
-                let sample = self.logic.advance();
-                self.publish(&sample)?;
+                self.advance()?;
             }
             if self.logic.now() > before {
                 progress = Instant::now();
@@ -155,10 +165,23 @@ impl SpacecraftNode {
             }
             due += tick;
             latest = due.max(now + COMMAND_PATIENCE);
-            let sample = self.logic.advance();
-            self.publish(&sample)?;
+            self.advance()?;
         }
         Ok(())
+    }
+
+    fn advance(&mut self) -> Result<()> {
+        if self.base.strikes_at().is_some_and(|at| self.logic.now() >= at) {
+            let _ = self.states.flush(FLUSH_TIMEOUT);
+            let _ = self.clock.flush(FLUSH_TIMEOUT);
+            self.base.strike();
+        }
+        let command = self.logic.next_command();
+        if let Some(journal) = &mut self.journal {
+            journal.add(&command)?;
+        }
+        let sample = self.logic.advance_by(&command);
+        self.publish(&sample)
     }
 
     fn take_commands(&mut self) -> Result<()> {
@@ -205,4 +228,25 @@ impl SpacecraftNode {
         }
         Ok(())
     }
+}
+
+/// The file of the commands that were flown.
+const JOURNAL: &str = "spacecraft.commands";
+
+/// A spacecraft where the one before was, if there was one, and the states that may be without an answer, but for the last.
+fn take_up(
+    base: &MissionNode,
+    mut logic: SpacecraftLogic,
+) -> Result<(Option<Journal>, VecDeque<StateSample>, SpacecraftLogic)> {
+    let Some(path) = base.keeps(JOURNAL) else { return Ok((None, VecDeque::new(), logic)) };
+    let (journal, flown) = Journal::open(&path, base.node.epoch() > 0)?;
+    let mut before = None;
+    for command in &flown {
+        before = Some(logic.sample());
+        logic.advance_by(command);
+    }
+    if !flown.is_empty() {
+        tracing::info!("the spacecraft goes on at {}", logic.now());
+    }
+    Ok((Some(journal), before.into_iter().collect(), logic))
 }
