@@ -48,7 +48,6 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     let frames = node.publisher(&graph::TF).unwrap();
     let upcoming = node.publisher(&graph::UPCOMING_STRIPS).unwrap();
-    let reliable = QosProfile::publisher_default().history(History::KeepLast { depth: 100 });
     let passing = QosProfile::publisher_default()
         .history(History::KeepLast { depth: 100 })
         .lifespan(Some(Duration::from_secs(10)));
