@@ -5,5 +5,6 @@
 pub mod debrief;
 pub mod launch;
 pub mod operate;
+pub mod passes;
 pub mod place;
 pub mod requests;

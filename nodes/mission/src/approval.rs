@@ -323,7 +323,7 @@ mod tests {
 
     use swath_sim::config::SimConfig;
     use swath_sim::learn::episode::{Env, EpisodeConfig};
-    use swath_sim::model::Model;
+    use swath_sim::vehicle::model::Model;
 
     use super::*;
 

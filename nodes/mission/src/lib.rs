@@ -8,6 +8,8 @@ pub mod faults;
 pub mod file;
 pub mod guarded;
 pub mod in_process;
+mod keeper;
+pub mod link;
 pub mod orders;
 pub mod outcome;
 pub mod requests;

@@ -26,9 +26,11 @@ use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
+use swath_node::stamp::Stamper;
 use swath_ros::RosArgs;
 
 use crate::place::Place;
+use crate::requests::orders::outcomes;
 
 /// `swath launch`.
 #[derive(Debug, Args)]
@@ -124,6 +126,9 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         if mission.sim.resources.is_some() {
             bail!("a mission with [resources] flies in one process only: add --in-process");
         }
+        if mission.link.is_some() {
+            bail!("a mission with [link] flies in one process only: add --in-process");
+        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
@@ -210,6 +215,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
     output.write_alarms(&flight.board().take_journal())?;
+    output.write_ways(&flight.ways())?;
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
@@ -221,7 +227,9 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         wall_seconds: started.elapsed().as_secs_f64(),
         requests: requested as u64,
         accepted: accepted as u64,
+        orders: outcomes(&Stamper::new(mission.epoch_unix_s, period), flight.requests()),
         resources: flight.resources(),
+        link: flight.link_summary(),
         ..SummaryInputs::default()
     };
     Ok(Flown { summary: Summary::new(inputs, &totals, period), failure, safe_mode: None })

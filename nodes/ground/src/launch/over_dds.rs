@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::task_record;
+use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 
 use super::fleet::{Event, Fleet, Happened};
 use super::output::{Flown, OutputFolder};
@@ -24,9 +24,14 @@ use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
 use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
-use swath_mission::outcome::{Summary, SummaryInputs};
+use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
+use crate::requests::orders::{Orders, stored};
+use crate::requests::store::Store;
+
+/// The request manager's store in the output folder.
+const STORE: &str = "requests.sqlite";
 /// How long the recorder and the console may take to come up.
 const START_TIMEOUT: Duration = Duration::from_secs(20);
 /// In lockstep, a mission without a decision for so long has stalled.
@@ -108,9 +113,23 @@ pub fn fly(
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,
+        orders: orders(output),
         resources: None,
+        link: None,
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
+}
+
+/// What became of orders, from the store that the request manager left.
+fn orders(output: &OutputFolder) -> Vec<OrderOutcome> {
+    let requests = Store::open_read_only(&output.path().join(STORE)).map_err(Into::into).and_then(|it| stored(&it));
+    match requests {
+        Ok(requests) => Orders::of(requests.into_iter().map(|(_, status)| status)).outcomes(),
+        Err(error) => {
+            tracing::warn!("the share imaged of orders is unknown: {error:#}");
+            Vec::new()
+        }
+    }
 }
 
 /// What the manifest of the bag tells besides the mission.
@@ -151,7 +170,7 @@ fn start_nodes(
         let own = ["--ros-args", "-p", &mission, "-p", &keep].map(str::to_owned);
         own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
-    let store = format!("store:={}", text(&output.path().join("requests.sqlite"))?);
+    let store = format!("store:={}", text(&output.path().join(STORE))?);
     fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
     for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
         fleet.start(name, program, &words(&[]))?;

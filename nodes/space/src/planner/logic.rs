@@ -1,10 +1,10 @@
 //! The planner node without ROS: it decides when both the situation and the candidates of a task are known.
 
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, Rationale};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{Task, TaskRecord};
 use swath_sim::vehicle::flight::Situation;
+use swath_sim::vehicle::model::Model;
 
 use swath_mission::approval::{Gate, GatedPlanner};
 
