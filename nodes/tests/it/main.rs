@@ -4,6 +4,7 @@
 mod bad_input;
 mod bag;
 mod bridge;
+mod citizens;
 mod clients;
 mod common;
 mod console;

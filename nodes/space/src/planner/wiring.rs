@@ -85,6 +85,9 @@ impl PlannerNode {
         let mode = base.node.parameters().declare(mode.read_only())?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
+        if let Some(warning) = policies.warning(&spec, &base.mission.sim) {
+            tracing::warn!("{warning}");
+        }
         let config = ApprovalConfig { mode: mode_at_start(&base, mode)?, ..base.mission.approval.clone() };
         let gate = Gate::new(&config, base.model.period);
         let planner = GatedPlanner { gate, planner };
