@@ -237,7 +237,7 @@ impl InProcessMission {
             reports.push(report);
         }
         reports.extend(planner);
-        report_all(&mut self.board, reports);
+        report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
     }
 }

@@ -1,6 +1,7 @@
 //! Tests of the programs of this suite, from outside: processes, topics, files.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
+mod alarms;
 mod bad_input;
 mod bag;
 mod bridge;
