@@ -138,6 +138,19 @@ fn rooms_of_sim_know_only_what_the_architecture_allows() {
     }
 }
 
+#[test]
+fn the_architecture_reads_in_ten_minutes() {
+    let text = include_str!("../../ARCHITECTURE.md");
+    // At 270 words a minute.
+    let words = text.split_whitespace().count();
+    assert!(words <= 2700, "{words} words: what concerns one part stands in that part's README.md");
+    let pages: Vec<_> = text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next()).collect();
+    assert!(pages.len() > 5, "{pages:?}");
+    for page in pages.iter().filter(|page| !page.is_empty() && !page.starts_with("http")) {
+        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(page).is_file(), "{page}");
+    }
+}
+
 fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1"])
