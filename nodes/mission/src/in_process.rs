@@ -13,7 +13,7 @@ use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
 use crate::alarms::Board;
-use crate::alarms::conditions::{Report, back, of_health, of_plan, of_planner, report_all};
+use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, report_all};
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::keeper::Keeper;
@@ -237,6 +237,8 @@ impl InProcessMission {
             reports.push(report);
         }
         reports.extend(planner);
+        let space = self.link().map(Apart::space);
+        reports.extend(space.map(|space| of_ground(now, space.heard(), space.command_lost(now))));
         report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
     }

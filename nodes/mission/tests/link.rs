@@ -137,7 +137,9 @@ fn with_a_link_that_never_opens_the_ground_knows_nothing() {
 fn without_commands_the_satellite_images_nothing_until_it_hears_again() {
     let link = "stations = [\"puertollano\", \"awarua\", \"punta-arenas\"]\ncommand_loss_h = 1.0";
     let mission = mission(8.0, 1500, 2, link);
-    let (tasks, flight) = flown(&mission, Vec::new());
+    let (tasks, mut flight) = flown(&mission, Vec::new());
+    let journal = flight.board().take_journal();
+    assert!(!journal.is_empty() && journal.iter().all(|it| it.key.name == "ground silent"), "{}", journal.len());
     let passes: Vec<(Tick, Tick)> = flight.link().unwrap().radio().contacts().from(Tick(0)).to_vec();
     let lost = |tick: Tick| passes.iter().all(|(rise, set)| tick < *rise || tick.since(*set) >= 7200);
     let images = |it: &&SettledTask| it.record.strip.is_some();
