@@ -291,7 +291,10 @@ impl Tap {
                 self.passed_over.insert(name);
                 continue;
             }
-            let offered = ros_qos::to_bag(&ros_qos::to_read(&offers, 1));
+            let mut offered = ros_qos::to_bag(&ros_qos::to_read(&offers, 1));
+            // Whoever plays it writes with it, while what is read should not be lost for being late.
+            let lifespans = offers.iter().map(|offer| offer.lifespan);
+            offered.lifespan = lifespans.min_by_key(|it| (it.sec, it.nsec)).unwrap_or(offered.lifespan);
             if let Err(error) = self.subscribe(&name, &type_name, offered, None) {
                 tracing::warn!("{name} is not recorded: {}", chain(&error));
                 self.passed_over.insert(name);

@@ -48,8 +48,10 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     let frames = node.publisher(&graph::TF).unwrap();
     let upcoming = node.publisher(&graph::UPCOMING_STRIPS).unwrap();
-    let reliable = QosProfile::publisher_default().history(History::KeepLast { depth: 100 });
-    let foreign = node.raw_publisher("/foreign", "foreign_msgs/msg/Thing", &reliable).unwrap();
+    let passing = QosProfile::publisher_default()
+        .history(History::KeepLast { depth: 100 })
+        .lifespan(Some(Duration::from_secs(10)));
+    let foreign = node.raw_publisher("/foreign", "foreign_msgs/msg/Thing", &passing).unwrap();
     upcoming.publish(&UpcomingStrips::default()).unwrap();
     wait_until("the recorder listens", || {
         clock.matched() * states.matched() * frames.matched() * upcoming.matched() * foreign.matched() > 0
@@ -82,6 +84,8 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     assert!(bag.topics().iter().all(|topic| topic.topic.name != "/rosout"));
     let upcoming = bag.topics().iter().find(|t| t.topic.name == "/swath/requests/upcoming").unwrap();
     assert_eq!(upcoming.topic.qos, [swath_bags::qos::QosProfile::latched(1)]);
+    let foreign = bag.topics().iter().find(|t| t.topic.name == "/foreign").unwrap();
+    assert_eq!(foreign.topic.qos[0].lifespan, swath_bags::qos::QosDuration { sec: 10, nsec: 0 });
 }
 
 #[test]

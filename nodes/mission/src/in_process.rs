@@ -4,16 +4,16 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::mission::Mission as Loop;
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
 use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
 use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
 use crate::alarms::Board;
-use crate::alarms::conditions::{Report, back, of_health, of_plan, of_planner, report_all};
+use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, report_all};
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::keeper::Keeper;
@@ -237,6 +237,8 @@ impl InProcessMission {
             reports.push(report);
         }
         reports.extend(planner);
+        let space = self.link().map(Apart::space);
+        reports.extend(space.map(|space| of_ground(now, space.heard(), space.command_lost(now))));
         report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
     }
@@ -311,7 +313,7 @@ mod tests {
 
     use super::*;
     use crate::alarms::{Entry, Event};
-    use crate::guarded::GuardedPlanner;
+    use crate::fallback::GuardedPlanner;
 
     fn mission(faults: &[&str]) -> Mission {
         let text =

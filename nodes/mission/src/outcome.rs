@@ -5,7 +5,7 @@ use swath_sim::mission::Delivered;
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
-use crate::guarded::Deciders;
+use crate::fallback::Deciders;
 use crate::link::response::LinkSummary;
 
 /// Most orders in a table for people.

@@ -1,4 +1,5 @@
 //! Missions over the radio in one process.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use swath_mission::file::Mission;
 use swath_mission::in_process::InProcessMission;
@@ -136,8 +137,10 @@ fn with_a_link_that_never_opens_the_ground_knows_nothing() {
 fn without_commands_the_satellite_images_nothing_until_it_hears_again() {
     let link = "stations = [\"puertollano\", \"awarua\", \"punta-arenas\"]\ncommand_loss_h = 1.0";
     let mission = mission(8.0, 1500, 2, link);
-    let (tasks, flight) = flown(&mission, Vec::new());
-    let passes: Vec<(Tick, Tick)> = flight.link().unwrap().radio().contacts().from(Tick(0)).iter().copied().collect();
+    let (tasks, mut flight) = flown(&mission, Vec::new());
+    let journal = flight.board().take_journal();
+    assert!(!journal.is_empty() && journal.iter().all(|it| it.key.name == "ground silent"), "{}", journal.len());
+    let passes: Vec<(Tick, Tick)> = flight.link().unwrap().radio().contacts().from(Tick(0)).to_vec();
     let lost = |tick: Tick| passes.iter().all(|(rise, set)| tick < *rise || tick.since(*set) >= 7200);
     let images = |it: &&SettledTask| it.record.strip.is_some();
     assert!(tasks.iter().filter(images).count() > 10);

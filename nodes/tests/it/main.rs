@@ -5,6 +5,7 @@ mod alarms;
 mod bad_input;
 mod bag;
 mod bridge;
+mod citizens;
 mod clients;
 mod common;
 mod console;

@@ -3,7 +3,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use swath_msgs::swath_msgs as msg;
 use swath_node::orders::request_of_strip;
-use swath_sim::model::Model;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::mrp;
 use swath_sim::world::frames::latitude_longitude_deg;
 use swath_sim::world::turn::Turn;

@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::task_record;
+use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 
 use super::fleet::{Event, Fleet, Happened};
 use super::output::{Flown, OutputFolder};
@@ -21,10 +21,10 @@ use super::progress::Progress;
 use crate::alarms::FlyingBoard;
 use swath_mission::alarms::Key;
 use swath_mission::alarms::conditions::{Report, of_plan};
+use swath_mission::fallback::{Deciders, Policies, fallback, made_instead};
 use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
-use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
 use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 

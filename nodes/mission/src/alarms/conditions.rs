@@ -13,6 +13,8 @@ use crate::faults::plan::{FaultPlan, Scheduled};
 const GUIDANCE: &str = "guidance";
 /// Who tells of planners that are replaced.
 const PLANNER: &str = "planner";
+/// Who tells of a ground that is not heard.
+const CATALOGUE: &str = "catalogue";
 /// Who tells of lost nodes.
 const LAUNCHER: &str = "launcher";
 
@@ -76,6 +78,13 @@ pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
 pub fn of_planner(tick: Tick, replaced: Option<&str>, name: &str) -> Report {
     let text = replaced.map_or_else(|| "it decides".to_owned(), |reason| format!("{reason}; {name} takes over"));
     Report::new(tick, PLANNER, "planner replaced", replaced.is_some(), text)
+}
+
+/// What the on-board catalogue reports of the ground, which it has heard last at a tick.
+#[must_use]
+pub fn of_ground(tick: Tick, heard: Tick, silent: bool) -> Report {
+    let text = if silent { format!("nothing is heard since {heard}") } else { "it is heard".to_owned() };
+    Report::new(tick, CATALOGUE, "ground silent", silent, text)
 }
 
 /// What is reported of the faults by order that wheels and sensors do not show: when each begins and ends.

@@ -117,6 +117,15 @@ pub const DEFINITIONS: &[Definition] = &[
             "look at the node's log; let the planner choose again when the cause is mended: `swath planner mode autonomous`",
         ],
     ),
+    lasting(
+        "ground silent",
+        Severity::Error,
+        [
+            "the satellite has heard no frame from the ground for `command_loss_h`",
+            "it holds its attitude and images nothing until it hears one",
+            "look at the next passes (`swath passes`) and at the stations",
+        ],
+    ),
     moment(
         "planner late",
         Severity::Warn,

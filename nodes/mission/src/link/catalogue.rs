@@ -87,6 +87,12 @@ impl Catalogue {
         self.command_loss.is_some_and(|patience| now.0.saturating_sub(self.heard.0) >= patience)
     }
 
+    /// When a frame from the ground was heard last; the epoch before any.
+    #[must_use]
+    pub fn heard(&self) -> Tick {
+        self.heard
+    }
+
     /// A frame is heard.
     pub fn hear(&mut self, now: Tick, bytes: &[u8]) {
         let heard = self.end.counts().heard;

@@ -192,8 +192,8 @@ impl End {
         for part in frame.parts {
             self.owes = true;
             let Some(inbox) = self.inn.get_mut(usize::from(part.class)) else { continue };
-            for (number, item) in (part.first..).zip(part.items) {
-                inbox.put(number, item);
+            for (at, item) in part.items.into_iter().enumerate() {
+                inbox.put(part.first.saturating_add(at as u64), item);
             }
         }
         let mut arrivals = Vec::new();

@@ -14,4 +14,6 @@ pub mod radio;
 pub mod response;
 
 #[cfg(test)]
+mod both_tests;
+#[cfg(test)]
 mod end_tests;

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use nalgebra::{UnitQuaternion, Vector3};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::state_sample;
+use swath_node::messages::spacecraft_state::state_sample;
 
 use crate::debrief::places::{Place, attitude_E, position_E, sub_satellite, velocity_E};
 use crate::debrief::recorded::Recorded;
