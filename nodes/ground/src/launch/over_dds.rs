@@ -71,13 +71,7 @@ pub fn fly(
     let mut fleet = Fleet::new(&mission.supervision);
     let record = wishes.record;
     if record {
-        let bag = output.path().join("bag");
-        let (manifest, output) = (text(mission_file)?, text(&bag)?);
-        let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
-        let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
-        let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
-        fleet.start(graph::RECORDER, "swath-bag", &words)?;
-        fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
+        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, manifest_data)?;
     }
     if let Some(address) = wishes.console {
         show(&mut fleet, &mission.name, &namespace, address)?;
@@ -133,6 +127,22 @@ fn orders(output: &OutputFolder) -> Vec<OrderOutcome> {
             Vec::new()
         }
     }
+}
+
+/// Starts the recorder, and waits until it listens.
+fn start_recorder(
+    fleet: &mut Fleet,
+    mission_file: &Path,
+    bag: &Path,
+    namespace: &str,
+    manifest_data: Vec<String>,
+) -> Result<()> {
+    let (manifest, output) = (text(mission_file)?, text(bag)?);
+    let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
+    let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
+    let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(namespace)).collect();
+    fleet.start(graph::RECORDER, "swath-bag", &words)?;
+    fleet.wait_for_line(graph::RECORDER, START_TIMEOUT).map(drop)
 }
 
 /// What the manifest of the bag tells besides the mission.
