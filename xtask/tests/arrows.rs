@@ -52,7 +52,8 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("swath-bags", &["tch", "torch-sys"]),
     ("swath-training", &["ros2-client", "rustdds", "mcap"]),
     ("swath-python", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
-    ("swath-mission", &["ros2-client", "rustdds", "mcap", "rusqlite", "tch", "torch-sys"]),
+    // Of SQLite it knows the files that people bring (GeoPackage), no store.
+    ("swath-mission", &["ros2-client", "rustdds", "mcap", "tch", "torch-sys"]),
     ("swath-node", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-space", &["tch", "torch-sys", "mcap", "rusqlite"]),
     ("swath-ground", &["tch", "torch-sys"]),
@@ -69,16 +70,12 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("config", &["error", "time"]),
     ("world", &["config", "error", "time"]),
     ("task", &["time", "world"]),
-    ("vehicle", &["config", "error", "model", "rng", "task", "time", "world"]),
-    ("model", &["config", "error", "time", "vehicle", "world"]),
-    ("requests", &["config", "error", "model", "rng", "time", "world"]),
-    ("planner", &["model", "requests", "rng", "task", "time", "vehicle", "world"]),
-    ("mission", &["model", "planner", "requests", "task", "time", "vehicle"]),
-    (
-        "learn",
-        &["config", "error", "mission", "model", "planner", "requests", "rng", "task", "time", "vehicle", "world"],
-    ),
-    ("foresight", &["learn", "model", "planner", "requests", "time", "vehicle", "world"]),
+    ("vehicle", &["config", "error", "rng", "task", "time", "world"]),
+    ("requests", &["config", "error", "rng", "time", "vehicle", "world"]),
+    ("planner", &["requests", "rng", "task", "time", "vehicle", "world"]),
+    ("mission", &["planner", "requests", "task", "time", "vehicle"]),
+    ("learn", &["config", "error", "mission", "planner", "requests", "rng", "task", "time", "vehicle", "world"]),
+    ("foresight", &["learn", "planner", "requests", "time", "vehicle", "world"]),
 ];
 
 /// The source folders of all crates.

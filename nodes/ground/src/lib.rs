@@ -2,6 +2,7 @@
 //! afterwards.
 #![expect(non_snake_case, reason = "frame letters")]
 
+pub mod alarms;
 pub mod debrief;
 pub mod launch;
 pub mod operate;

@@ -8,7 +8,6 @@ use swath_sim::config::SimConfig;
 use swath_sim::config::resources::ResourcesConfig;
 use swath_sim::error::SimError;
 use swath_sim::mission::horizon;
-use swath_sim::model::Model;
 use swath_sim::planner::PlannerSpec;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
@@ -16,6 +15,7 @@ use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::faults::{Fault as VehicleFault, TimedFault};
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::stations::NeverSeen;
@@ -25,8 +25,11 @@ use crate::approval::ApprovalConfig;
 use crate::faults::{FaultPlan, FaultPlanError};
 use crate::link::config::{LinkConfig, LinkConfigError};
 use crate::orders::cutting::{Cutting, SWATH_KM};
-use crate::orders::import::{Fault, RequestsFileError, import};
+use crate::orders::found::Fault;
+use crate::orders::import::{RequestsFileError, import};
 use crate::orders::order::Order;
+use crate::orders::rows::Rows;
+use crate::orders::short_lines::ShortLines;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
 use crate::supervision::SupervisionConfig;
@@ -116,7 +119,7 @@ pub struct Mission {
     #[serde(skip_serializing)]
     pub resources: Option<Box<ResourcesConfig>>,
     /// How the satellite that is flown differs from what guidance and planner believe of it.
-    #[serde(skip_serializing_if = "is_exact")]
+    #[serde(skip_serializing_if = "is_default")]
     pub plant: PlantErrors,
     /// What fails on the way.
     #[serde(skip_serializing_if = "FaultPlan::is_empty")]
@@ -133,8 +136,8 @@ fn is_usual(supervision: &SupervisionConfig) -> bool {
     *supervision == SupervisionConfig::default()
 }
 
-fn is_exact(plant: &PlantErrors) -> bool {
-    *plant == PlantErrors::default()
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Strips known from the start.
@@ -147,6 +150,12 @@ pub struct MissionRequests {
     pub max_attempts: u32,
     /// Width of what the camera shows [km]: lines are followed and areas are covered by strips of it.
     pub swath_km: f64,
+    /// Direction of the strips of areas: `fewest`, `passes`, or a heading in degrees as text.
+    #[serde(skip_serializing_if = "is_default")]
+    pub rows: Rows,
+    /// What becomes of lines that are shorter than a strip may be: `refuse`, `stretch` or `join`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub short_lines: ShortLines,
     /// Random strips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub random: Option<ScenarioConfig>,
@@ -154,7 +163,14 @@ pub struct MissionRequests {
 
 impl Default for MissionRequests {
     fn default() -> Self {
-        Self { files: Vec::new(), max_attempts: 10, swath_km: SWATH_KM, random: None }
+        Self {
+            files: Vec::new(),
+            max_attempts: 10,
+            swath_km: SWATH_KM,
+            rows: Rows::default(),
+            short_lines: ShortLines::default(),
+            random: None,
+        }
     }
 }
 
@@ -344,8 +360,8 @@ impl Mission {
     /// How lines and areas become strips.
     #[must_use]
     pub fn cutting(&self) -> Cutting {
-        let swath_km = self.requests.swath_km;
-        Cutting { swath_km, tolerance_km: 0.5 * swath_km, ..Cutting::of(&self.sim) }
+        let MissionRequests { swath_km, rows, short_lines, .. } = self.requests;
+        Cutting { swath_km, tolerance_km: 0.5 * swath_km, rows, short_lines, ..Cutting::of(&self.sim) }
     }
 
     /// The strips known from the start: those of the files, in order, then the random ones; and what in the files is no
@@ -412,6 +428,18 @@ mod tests {
         assert_eq!(error, "mission setting resources.panel_efficiency is 1.5, outside 0 to 1");
         let error = read("[resources]\nstations = []").unwrap_err();
         assert!(error.contains("no stations to send to"), "{error}");
+    }
+
+    #[test]
+    fn how_lines_and_areas_become_strips_is_a_setting() {
+        let mission = parse("[requests]\nrows = \"passes\"\nshort_lines = \"join\"\nswath_km = 20.0").unwrap();
+        let cutting = mission.cutting();
+        assert_eq!((cutting.rows, cutting.short_lines), (Rows::Passes, ShortLines::Join));
+        assert_eq!((cutting.swath_km, cutting.tolerance_km), (20.0, 10.0));
+        assert_eq!(parse(&toml::to_string(&mission).unwrap()), Ok(mission));
+        let error = parse("[requests]\nrows = \"north\"").unwrap_err();
+        assert!(error.contains("`north` is neither `fewest`, `passes` nor a heading"), "{error}");
+        assert!(parse("[requests]\nshort_lines = \"melt\"").unwrap_err().contains("unknown variant `melt`"));
     }
 
     #[test]

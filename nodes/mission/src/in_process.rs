@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::mission::Mission as Loop;
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
 use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
 use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
 use crate::alarms::Board;
@@ -239,7 +239,7 @@ impl InProcessMission {
         reports.extend(planner);
         let space = self.link().map(Apart::space);
         reports.extend(space.map(|space| of_ground(now, space.heard(), space.command_lost(now))));
-        report_all(&mut self.board, reports);
+        report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
     }
 }
@@ -313,7 +313,7 @@ mod tests {
 
     use super::*;
     use crate::alarms::{Entry, Event};
-    use crate::guarded::GuardedPlanner;
+    use crate::fallback::GuardedPlanner;
 
     fn mission(faults: &[&str]) -> Mission {
         let text =

@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 
 use swath_sim::mission::RequestKeeper;
-use swath_sim::model::Model;
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::TaskRecord;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
 use crate::file::{Mission, MissionError};

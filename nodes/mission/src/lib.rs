@@ -4,9 +4,9 @@
 
 pub mod alarms;
 pub mod approval;
+pub mod fallback;
 pub mod faults;
 pub mod file;
-pub mod guarded;
 pub mod in_process;
 mod keeper;
 pub mod link;

@@ -5,8 +5,11 @@ use swath_sim::mission::Delivered;
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
-use crate::guarded::Deciders;
+use crate::fallback::Deciders;
 use crate::link::response::LinkSummary;
+
+/// Most orders in a table for people.
+const ORDERS_TOLD: usize = 20;
 
 /// One line of `tasks.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,12 +116,36 @@ pub struct Summary {
     pub messages_recorded: u64,
     /// Processes that flew the mission.
     pub nodes: Vec<NodeProcess>,
+    /// Lines and areas that became several strips; absent if there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub orders: Vec<OrderOutcome>,
     /// What came to the ground and what was left, in a mission with `[resources]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resources: Option<ResourcesSummary>,
     /// How long orders took over the radio, in a mission with `[link]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<LinkSummary>,
+}
+
+/// A line or an area that became several strips, and how much of it is imaged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OrderOutcome {
+    /// Its number.
+    pub order_id: u64,
+    /// Who asked for it.
+    pub submitter: String,
+    /// The submitter's reference.
+    pub order_ref: String,
+    /// Its name.
+    pub name: String,
+    /// Its strips.
+    pub strips: u32,
+    /// What imaging all of it is worth.
+    pub priority: f64,
+    /// Share of its worth that is imaged.
+    pub imaged: f64,
+    /// Reward earned with it.
+    pub reward: f64,
 }
 
 /// What came to the ground, and how power and data stood at the end.
@@ -157,6 +184,8 @@ pub struct SummaryInputs {
     pub messages_recorded: u64,
     /// Processes.
     pub nodes: Vec<NodeProcess>,
+    /// Lines and areas that became several strips.
+    pub orders: Vec<OrderOutcome>,
     /// What came to the ground and what was left.
     pub resources: Option<ResourcesSummary>,
     /// How long orders took over the radio.
@@ -191,6 +220,7 @@ impl Summary {
             wait_s: seconds(totals.wait_ticks),
             messages_recorded: inputs.messages_recorded,
             nodes: inputs.nodes,
+            orders: inputs.orders,
             resources: inputs.resources,
             link: inputs.link,
         }
@@ -228,6 +258,17 @@ impl Summary {
         }
         rows.extend(self.link.iter().flat_map(LinkSummary::rows));
         let lines = rows.iter().map(|(name, value)| format!("  {name:<20} {value}\n"));
-        lines.collect()
+        let told = self.orders.iter().take(ORDERS_TOLD).map(|it| {
+            let name: String = it.name.chars().filter(|letter| !letter.is_control()).collect();
+            format!(
+                "  {:<20} {:.1} % of {name} imaged, {} strips\n",
+                format!("order {}", it.order_id),
+                100.0 * it.imaged,
+                it.strips
+            )
+        });
+        let rest = self.orders.len().saturating_sub(ORDERS_TOLD);
+        let rest = (rest > 0).then(|| format!("  {:<20} in summary.json\n", format!("{rest} more orders")));
+        lines.chain(told).chain(rest).collect()
     }
 }

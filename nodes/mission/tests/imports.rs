@@ -5,9 +5,13 @@ use std::path::Path;
 
 use rand::{RngExt as _, SeedableRng as _};
 use swath_mission::orders::cutting::Cutting;
-use swath_mission::orders::formats;
-use swath_mission::orders::import::{Import, Shown, import_features};
+use swath_mission::orders::formats::{self, Source};
+use swath_mission::orders::found::{Import, Shown};
+use swath_mission::orders::import::import_features;
 use swath_mission::orders::order::Order;
+use swath_mission::orders::short_lines::ShortLines;
+use swath_mission::shapes::cover::shows;
+use swath_mission::shapes::sphere::{Arc, direction};
 use swath_sim::config::SimConfig;
 
 const KML: &str = r#"<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document><Folder><Placemark id="k">
@@ -20,7 +24,7 @@ const GEOJSON: &str = r#"{"type":"Feature","properties":{"name":"x"},
 const CSV: &str = "name,start_lat,start_lon,end_lat,end_lon\nx,45,10,46,12\n";
 
 fn try_read(name: &str, bytes: &[u8]) -> Result<Import, String> {
-    let features = formats::read(bytes, Path::new(name)).map_err(|error| error.to_string())?;
+    let features = formats::read(&Source::alone(name, bytes)).map_err(|error| error.to_string())?;
     Ok(import_features(features, Path::new(name), &Cutting::of(&SimConfig::default())))
 }
 
@@ -116,14 +120,22 @@ fn other_reference_systems_are_refused_by_name() {
 #[test]
 fn formats_that_are_not_read_are_named_with_what_converts_them() {
     for (begin, format) in [
-        (&b"SQLite format 3\0"[..], "a GeoPackage or another SQLite file"),
-        (b"\x00\x00\x27\x0a\x00", "a shapefile"),
-        (b"fgb\x03fgb\0", "FlatGeobuf"),
-        (b"PK\x03\x04", "a ZIP archive, such as KMZ"),
+        (&b"SQLite format 3\0"[..], "a SQLite file that is no GeoPackage"),
+        (b"PK\x03\x04", "a ZIP archive, such as KMZ or a packed Shapefile"),
+        (b"\x1f\x8b\x08", "compressed by gzip"),
+        (b"PAR1", "GeoParquet"),
+        (b"!table\n!version 300", "MapInfo TAB"),
+        (b"{\"type\":\"Topology\",\"arcs\":[]}", "TopoJSON"),
+        (b"{\"geometryType\":\"esriGeometryPolyline\",\"features\":[]}", "Esri JSON"),
+        (b"<?xml version=\"1.0\"?><osm version=\"0.6\"></osm>", "OpenStreetMap XML"),
         (b"<gml:FeatureCollection xmlns:gml=\"http://www.opengis.net/gml\"/>", "GML"),
     ] {
         let error = try_read("a.bin", begin).unwrap_err();
         assert!(error.contains(format) && error.contains("ogr2ogr"), "{error}");
+    }
+    for begin in [&b"fgb\x03fgb\0"[..], b"fgb\x09fgb\0\0\0"] {
+        let error = try_read("a.fgb", begin).unwrap_err();
+        assert!(error.starts_with("is not FlatGeobuf: it "), "{error}");
     }
     assert!(try_read("a.txt", b"once upon a time").unwrap_err().contains("of no format that is known"));
     assert!(try_read("a.geojson", b"once upon a time").unwrap_err().contains("is not GeoJSON"));
@@ -211,9 +223,13 @@ fn identity_does_not_hang_on_position_or_file_name() {
 #[test]
 fn short_lines_are_stretched_if_that_is_wanted() {
     let text = r#"{"type":"LineString","coordinates":[[10,0],[10.1,0]]}"#;
-    let features = || formats::read(text.as_bytes(), Path::new("short.geojson")).unwrap();
+    let features = || formats::read(&Source::alone("short.geojson", text)).unwrap();
     let cutting = Cutting::of(&SimConfig::default());
-    let import = import_features(features(), Path::new("short.geojson"), &Cutting { stretch: true, ..cutting });
+    let import = import_features(
+        features(),
+        Path::new("short.geojson"),
+        &Cutting { short_lines: ShortLines::Stretch, ..cutting },
+    );
     let config = SimConfig::default();
     import.orders[0].request.to_strip(&config.requests, config.earth.radius_m).unwrap();
     let as_it_is = import_features(features(), Path::new("short.geojson"), &cutting);
@@ -253,4 +269,125 @@ fn damaged_files_of_every_format_are_refused_or_read_and_nothing_panics() {
         }
     }
     assert!(read > 1000, "only {read} were still read");
+}
+
+#[test]
+fn short_lines_of_a_feature_are_joined_if_it_says_so() {
+    let text = |short_lines: &str| {
+        format!(
+            r#"{{"type":"Feature","properties":{{"name":"f","client_ref":"f"{short_lines}}},"geometry":{{"type":"MultiLineString",
+            "coordinates":[[[10,0],[10.1,0]],[[10.1,0],[10.2,0]],[[10.2,0.001],[10.3,0]],[[20,0],[20.1,0]]]}}}}"#
+        )
+    };
+    let lengths = |text: &str| {
+        let import = read("f.geojson", text);
+        let config = SimConfig::default();
+        let allowed = |order: &Order| order.request.to_strip(&config.requests, config.earth.radius_m).is_ok();
+        let short = import.cut.iter().filter(|cut| matches!(cut.shown, Shown::Line { too_short: true, .. })).count();
+        (import.orders.len(), import.orders.iter().filter(|order| allowed(order)).count(), short)
+    };
+    assert_eq!(lengths(&text("")), (4, 0, 4));
+    assert_eq!(lengths(&text(r#","short_lines":"stretch""#)), (4, 4, 0));
+    let joined = text(r#","short_lines":"join""#);
+    assert_eq!(lengths(&joined), (2, 2, 0));
+    let names: Vec<_> = orders("f.geojson", &joined).iter().map(|order| order.name.clone()).collect();
+    assert_eq!(names, ["f 1", "f 4"]);
+    let [Shown::Line { length_km, farthest_km, .. }, _] =
+        &read("f.geojson", &joined).cut.iter().map(|cut| cut.shown).collect::<Vec<_>>()[..]
+    else {
+        panic!("two lines")
+    };
+    assert!((length_km - 33.5).abs() < 0.1 && *farthest_km < 0.2, "{length_km} {farthest_km}");
+    let error = &faults("f.geojson", &text(r#","short_lines":"melt""#))[0];
+    assert!(error.ends_with("`short_lines`: `melt` is neither `refuse`, `stretch` nor `join`"), "{error}");
+}
+
+#[test]
+fn areas_lie_along_the_passes_or_a_heading_if_they_say_so() {
+    let area = |rows: &str| {
+        format!(
+            r#"{{"type":"Feature","properties":{{"name":"a"{rows}}},"geometry":{{"type":"Polygon",
+            "coordinates":[[[9,29],[11,29],[11,30],[9,30],[9,29]]]}}}}"#
+        )
+    };
+    let headings = |rows: &str| -> Vec<f64> {
+        let heading = |order: &Order| {
+            let it = &order.request;
+            let east = (it.end_longitude_deg - it.start_longitude_deg) * it.start_latitude_deg.to_radians().cos();
+            east.atan2(it.end_latitude_deg - it.start_latitude_deg).to_degrees().rem_euclid(180.0)
+        };
+        orders("a.geojson", &area(rows)).iter().map(heading).collect()
+    };
+    let fewest = headings("");
+    assert!(fewest.iter().all(|heading| (heading - 90.0).abs() < 2.0), "along its longer side: {fewest:?}");
+    let passes = headings(r#","rows":"passes""#);
+    // The track of an orbit of 45° at 29.5° of latitude, seen from the ground that turns.
+    let track = swath_mission::orders::rows::Passes::of(&SimConfig::default()).headings(29.5_f64.to_radians());
+    let near = |heading: &f64| track.iter().any(|it| (it.to_degrees().rem_euclid(180.0) - heading).abs() < 2.0);
+    assert!(passes.iter().all(near), "{passes:?} {track:?}");
+    assert!(passes.len() > fewest.len());
+    assert!(headings(r#","rows":20"#).iter().all(|heading| (heading - 20.0).abs() < 2.0));
+    let error = &faults("a.geojson", &area(r#","rows":"north""#))[0];
+    assert!(error.contains("`rows`: `north` is neither `fewest`, `passes` nor a heading"), "{error}");
+}
+
+#[test]
+fn an_area_is_the_same_whoever_wrote_it() {
+    let area = |coordinates: &str| {
+        let text = format!(r#"{{"type":"Polygon","coordinates":{coordinates}}}"#);
+        orders("a.geojson", &text)
+    };
+    let one = area(
+        "[[[179,10],[181,10],[181,11.2],[180.2,11.5],[179,11],[179,10]],[[179.5,10.4],[179.9,10.4],[179.7,10.8],[179.5,10.4]]]",
+    );
+    assert!(one.len() > 8);
+    for other in [
+        "[[[-179,10],[-179,11.2],[-179.8,11.5],[179,11],[179,10],[-179,10]],[[179.5,10.4],[179.7,10.8],[179.9,10.4],[179.5,10.4]]]",
+        "[[[539,11],[539,10],[539,10],[541,10],[541,11.2],[540.2,11.5],[539,11]],[[179.7,10.8],[179.5,10.4],[179.9,10.4],[179.7,10.8]]]",
+    ] {
+        let other = area(other);
+        assert_eq!(other.len(), one.len());
+        let same = |(a, b): (&Order, &Order)| a.client_ref == b.client_ref && a.is_for_the_same_as(b);
+        assert!(other.iter().zip(&one).all(same), "{other:?}");
+    }
+}
+
+#[test]
+fn one_bad_area_of_several_costs_itself() {
+    let text = r#"{"type":"Feature","properties":{"name":"m"},"geometry":{"type":"MultiPolygon","coordinates":[
+        [[[0,0],[1,0],[1,0.5],[0,0]]],[[[0,91],[1,0],[1,1],[0,91]]]]}}"#;
+    let import = read("m.geojson", text);
+    assert!(!import.orders.is_empty());
+    let faults: Vec<_> = import.refused.iter().map(ToString::to_string).collect();
+    assert_eq!(faults, ["requests m.geojson, feature 1, part 2: 0, 91 is no longitude and latitude"]);
+}
+
+#[test]
+fn a_day_counts_from_its_beginning_to_its_end() {
+    let text = GEOJSON
+        .replace(r#""name":"x""#, r#""name":"x","valid_from":"2026-01-01","valid_until":"2026/01/02 12:00:00+00""#);
+    assert_eq!(orders("d.geojson", &text)[0].validity_ns(), (1_767_225_600_000_000_000, 1_767_355_200_000_000_000));
+    let text = GEOJSON.replace(r#""name":"x""#, r#""name":"x","valid_until":"2026-01-01""#);
+    assert_eq!(orders("d.geojson", &text)[0].valid_until_ns, 1_767_312_000_000_000_000);
+}
+
+#[test]
+fn a_continent_is_shown_by_the_strips_that_are_submitted() {
+    let text = r#"{"type":"Polygon","coordinates":[[[115,-35],[150,-38],[145,-12],[120,-15],[115,-35]]]}"#;
+    let import = read("continent.geojson", text);
+    let cutting = Cutting::of(&SimConfig::default());
+    let arc = |order: &Order| {
+        let it = &order.request;
+        let start = direction([it.start_longitude_deg, it.start_latitude_deg]);
+        Arc::new(start, direction([it.end_longitude_deg, it.end_latitude_deg])).unwrap()
+    };
+    let arcs: Vec<_> = import.orders.iter().map(arc).collect();
+    let mut rng = rand::rngs::StdRng::seed_from_u64(3);
+    let width = cutting.swath_km * 1e3 / cutting.radius_m;
+    let shown = (0..2000).filter(|_| {
+        let point = direction([rng.random_range(122.0..143.0), rng.random_range(-33.0..-17.0)]);
+        arcs.iter().any(|arc| shows(arc, &point, width))
+    });
+    let share = shown.count() as f64 / 2000.0;
+    assert!(share > 0.995, "{share}");
 }

@@ -10,8 +10,8 @@ use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
 use crate::out;

@@ -3,9 +3,12 @@
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Review;
 use swath_mission::orders::action::{Act, Action};
+use swath_mission::orders::cutting::{Cutting, SWATH_KM};
 use swath_mission::orders::order::{Order, Part};
+use swath_mission::orders::rows::Passes;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
+use swath_sim::config::SimConfig;
 use swath_sim::time::Tick;
 use swath_sim::world::strip::{StripId, StripRequest};
 
@@ -36,6 +39,28 @@ pub fn order_of(message: &msg::StripRequest) -> Order {
         hold_for_approval: message.hold_for_approval,
         max_attempts: message.max_attempts,
         part: part_of(message),
+    }
+}
+
+/// How lines and areas become strips in the mission that told its limits.
+#[must_use]
+pub fn cutting_of(limits: &msg::GetLimitsResponse) -> Cutting {
+    let swath_km = if limits.swath_km > 0.0 { limits.swath_km } else { SWATH_KM };
+    let usual = Cutting::of(&SimConfig::default());
+    let passes = Passes {
+        inclination: limits.inclination_deg.to_radians(),
+        mean_motion: limits.mean_motion,
+        earth_rotation: limits.earth_rotation,
+    };
+    Cutting {
+        shortest_km: limits.length_min_km,
+        longest_km: limits.length_max_km,
+        swath_km,
+        tolerance_km: 0.5 * swath_km,
+        // A mission of before does not tell its orbit.
+        passes: if limits.mean_motion > 0.0 { passes } else { usual.passes },
+        radius_m: limits.earth_radius,
+        ..usual
     }
 }
 

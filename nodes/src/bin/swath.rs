@@ -26,6 +26,8 @@ enum Command {
     Strips(operate::StripsArgs),
     /// Say what the planner may do by itself, and decide on what it proposes.
     Planner(operate::PlannerArgs),
+    /// Say what is wrong, and what operators know of it.
+    Alarms(operate::AlarmsArgs),
     /// Say when stations see the satellite of a mission, from its file alone.
     Passes(passes::PassesArgs),
     /// Show a flying or a recorded mission as a page in a browser.
@@ -55,6 +57,7 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Launch(args) => return launch::run(&args, ros, &POLICIES),
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
+        Command::Alarms(args) => operate::run_alarms(&args, ros)?,
         Command::Passes(args) => passes::run(&args)?,
         Command::Console(args) => swath_console::run(&args, ros)?,
         Command::Bridge(args) => swath_bridge::run(&args, ros)?,

@@ -108,6 +108,16 @@ fn an_operators_day() {
     assert_eq!(history[..2], ["held", "accepted"], "{report}");
     assert!(history.contains(&"superseded"), "{report}");
 
+    // By what they have in common: several strips need a word more, and one does not.
+    let several = day.refused("strips replace --submitter floods examples/requests/replacement.geojson");
+    assert!(several.contains("strips are meant: --whole-order replaces all of them"), "{several}");
+    let third = folder.path().join("third.geojson");
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/requests/replacement.geojson"));
+    std::fs::write(&third, text.unwrap().replace("closer look", "third look")).unwrap();
+    day.swath(&format!("strips replace --name closer.look {}", third.display()));
+    assert_eq!(day.show(day.id_of("San Andreas, third look"))["status"]["supersedes"], new);
+
     note("planner mode hold");
     day.swath("planner mode hold");
     note("planner mode approve");
@@ -172,6 +182,18 @@ fn an_operators_day() {
         orders.iter().map(|it| (it["strips"].as_u64().unwrap(), it["imaged"].as_f64().unwrap())).collect();
     assert_eq!(shares.iter().map(|it| it.0).collect::<Vec<_>>(), [12, 9, 8], "flood, river, fire: {orders:?}");
     assert!(shares.iter().all(|(_, imaged)| *imaged > 0.999), "{orders:?}");
+
+    let summary: Value =
+        serde_json::from_str(&std::fs::read_to_string(disasters.join("summary.json")).unwrap()).unwrap();
+    let told: Vec<_> = summary["orders"].as_array().unwrap().iter().map(|it| it["imaged"].as_f64().unwrap()).collect();
+    assert_eq!(told, shares.iter().map(|it| it.1).collect::<Vec<_>>());
+    note("report out/disasters-109-1/bag -o disasters.html");
+    let page = folder.path().join("disasters.html");
+    day.swath(&format!("report {} -o {}", disasters.join("bag").display(), page.display()));
+    let page = std::fs::read_to_string(page).unwrap();
+    let (_, table) = page.split_once("<table id=\"orders\">").unwrap();
+    let table = &table[..table.find("</table>").unwrap()];
+    assert_eq!(table.matches("<td>100.0 %</td>").count(), 3, "{table}");
 
     let words = |words: &str| words.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>();
     let (shown, flown): (Vec<_>, Vec<_>) =

@@ -210,7 +210,7 @@ mod tests {
 
     use super::*;
     use crate::config::station::names;
-    use crate::model::Model;
+    use crate::vehicle::model::Model;
     use crate::world::orbit::OrbitPhase;
 
     /// Contacts by looking at every tick: slow, and independent of the roots.

@@ -4,13 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::{Result as Answer, ensure};
 use serde_json::Value;
-use swath_mission::orders::cutting::{Cutting, SWATH_KM};
-use swath_mission::orders::formats;
-use swath_mission::orders::import::{Import, import_features};
+use swath_mission::orders::formats::{self, Source};
+use swath_mission::orders::found::Import;
+use swath_mission::orders::import::import_features;
 use swath_mission::orders::order::{MISSION, Order};
 use swath_msgs::swath_msgs as msg;
-use swath_node::orders::request_message;
-use swath_sim::config::SimConfig;
+use swath_node::orders::{cutting_of, request_message};
 
 use crate::desks::{Counter, call, call_once};
 use crate::problem::Problem;
@@ -28,16 +27,10 @@ pub async fn read(counter: &Counter, name: &str, geojson: &Value, submitter: &st
     let stem: String = name.chars().filter(|c| c.is_alphanumeric() || "-_ ".contains(*c)).take(60).collect();
     let stem = if stem.trim().is_empty() { submitter.to_owned() } else { stem };
     let path = PathBuf::from(format!("{stem}.geojson"));
-    let features = formats::read(geojson.to_string().as_bytes(), &path)
+    let features = formats::read(&Source::alone(&path, geojson.to_string()))
         .map_err(|why| Problem::unfit(format!("{name:?} {why}")))?;
     let limits = counter.ask(|desks| call(&desks.limits, &msg::GetLimitsRequest::default())).await?;
-    let cutting = Cutting {
-        shortest_km: limits.length_min_km,
-        longest_km: limits.length_max_km,
-        swath_km: if limits.swath_km > 0.0 { limits.swath_km } else { SWATH_KM },
-        radius_m: limits.earth_radius,
-        ..Cutting::of(&SimConfig::default())
-    };
+    let cutting = cutting_of(&limits);
     // Areas take time to cover, and others wait for answers on this thread.
     let cut = tokio::task::spawn_blocking(move || import_features(features, &path, &cutting)).await;
     let mut import = cut.map_err(|_| Problem::unfit("the strips could not be cut"))?;

@@ -10,11 +10,11 @@ use clap::Args;
 use serde_json::Value;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{RosArgs, graph};
-use swath_sim::world::strip::StripId;
 
 use super::client::{Operator, check};
 use crate::requests::json::{exported, history_json};
-use crate::requests::messages::{history_entry, stored_status};
+use crate::requests::messages::history_entry;
+use crate::requests::orders::stored;
 use crate::requests::store::Store;
 use swath_mission::orders::order::Order;
 use swath_node::orders::order_of;
@@ -126,19 +126,4 @@ fn from_store(store: &Store) -> Result<Everything> {
         }
         trail.extend(lines.iter().map(|line| history_entry(&stamper, line)));
     }
-}
-
-/// The orders of a store, and where they stand.
-///
-/// # Errors
-/// When the store cannot be read.
-pub(super) fn stored(store: &Store) -> Result<Vec<(Order, msg::StripStatus)>> {
-    let snapshot = store.snapshot()?;
-    let stamper = store.stamper()?;
-    let stored = (1..).map(StripId).zip(snapshot.requests);
-    let requests = stored.map(|(id, stored)| {
-        let status = stored_status(&stamper, snapshot.progress.now, id, &stored);
-        (stored.request.order, status)
-    });
-    Ok(requests.collect())
 }

@@ -13,10 +13,14 @@ use swath_ros::{RosArgs, graph};
 use swath_sim::config::SimConfig;
 
 use super::client::Operator;
-use swath_mission::orders::cutting::{Cutting, SWATH_KM};
-use swath_mission::orders::feature::Part;
+use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature::{Feature, Part};
 use swath_mission::orders::formats::Features;
-use swath_mission::orders::import::{Cut, Import, Shown, features, import_features, write};
+use swath_mission::orders::found::{Cut, Import, Shown};
+use swath_mission::orders::import::{features, import_features, write};
+use swath_mission::orders::rows::Rows;
+use swath_mission::orders::short_lines::ShortLines;
+use swath_node::orders::cutting_of;
 
 /// How lines and areas become strips.
 #[derive(Debug, Args)]
@@ -30,12 +34,13 @@ pub struct CuttingArgs {
     /// Greatest distance of a line from its strips [km]; half a swath without this
     #[arg(long)]
     tolerance_km: Option<f64>,
-    /// Direction of the strips of areas, clockwise from north [deg]; the one with the fewest strips without this
-    #[arg(long, allow_hyphen_values = true)]
-    heading_deg: Option<f64>,
-    /// Make strips of lines that are shorter than the shortest strip, too
-    #[arg(long)]
-    stretch: bool,
+    /// Direction of the strips of areas: that with the fewest, that of the satellite's passes, or a heading clockwise
+    /// from north [deg]
+    #[arg(long, allow_hyphen_values = true, value_name = "fewest|passes|DEG", default_value_t)]
+    rows: Rows,
+    /// What becomes of lines that are shorter than the shortest strip
+    #[arg(long, value_name = "refuse|stretch|join", default_value_t)]
+    short_lines: ShortLines,
 }
 
 /// How long a dry run waits for a mission to tell its limits.
@@ -92,20 +97,10 @@ impl CuttingArgs {
             longest_km,
             swath_km,
             tolerance_km,
-            heading_deg: within("heading-deg", self.heading_deg, -360.0, 360.0)?,
-            stretch: self.stretch,
+            rows: self.rows,
+            short_lines: self.short_lines,
             ..*limits
         })
-    }
-}
-
-fn cutting_of(limits: &msg::GetLimitsResponse) -> Cutting {
-    Cutting {
-        shortest_km: limits.length_min_km,
-        longest_km: limits.length_max_km,
-        swath_km: if limits.swath_km > 0.0 { limits.swath_km } else { SWATH_KM },
-        radius_m: limits.earth_radius,
-        ..Cutting::of(&SimConfig::default())
     }
 }
 
@@ -122,11 +117,14 @@ impl Files {
         Ok(Self(files.iter().map(|file| Ok((file.clone(), features(file)?))).collect::<Result<_>>()?))
     }
 
-    /// How many lines and areas there are.
+    /// How many lines and areas there are; the areas of a feature are one.
     #[must_use]
     pub fn shapes(&self) -> usize {
-        let parts = self.0.iter().flat_map(|(_, features)| features.iter().flatten()).flat_map(|it| &it.parts);
-        parts.filter(|part| !matches!(part, Part::Other(_))).count()
+        let of_feature = |feature: &Feature| {
+            let lines = feature.parts.iter().filter(|part| matches!(part, Part::Line(_))).count();
+            lines + usize::from(feature.parts.iter().any(|part| matches!(part, Part::Area(_))))
+        };
+        self.0.iter().flat_map(|(_, features)| features.iter().flatten()).map(of_feature).sum()
     }
 
     /// Makes strips of them; what is no strip is told on stderr.
@@ -156,15 +154,15 @@ pub fn write_file(path: &Path, import: &Import) -> Result<()> {
     Ok(write(path, &import.orders)?)
 }
 
-/// What became of lines and areas, for people.
+/// What became of lines and areas, for people: of those that are other than their strips.
 #[must_use]
 pub fn cut_text(cut: &[Cut]) -> String {
     let mut text = String::new();
-    for Cut { name, strips, shown } in cut {
-        let name = printable(name);
-        let strips = if *strips == 1 { "1 strip".to_owned() } else { format!("{strips} strips") };
-        _ = match shown {
-            Shown::Line { length_km, farthest_km } => writeln!(
+    for cut in cut.iter().filter(|cut| cut.is_worth_a_word()) {
+        let name = printable(&cut.name);
+        let strips = if cut.strips == 1 { "1 strip".to_owned() } else { format!("{} strips", cut.strips) };
+        _ = match cut.shown {
+            Shown::Line { length_km, farthest_km, .. } => writeln!(
                 text,
                 "cut       {name}: a line of {length_km:.0} km, {strips}, at most {farthest_km:.1} km from it"
             ),
@@ -175,6 +173,12 @@ pub fn cut_text(cut: &[Cut]) -> String {
                 100.0 * twice
             ),
         };
+        if let Shown::Line { too_short: true, .. } = cut.shown {
+            text += "          too short for a strip: --short-lines stretches or joins such lines\n";
+        }
+        for reason in &cut.left_out {
+            _ = writeln!(text, "          left out {}", printable(reason));
+        }
     }
     text
 }
@@ -182,10 +186,11 @@ pub fn cut_text(cut: &[Cut]) -> String {
 /// What became of lines and areas, for machines.
 #[must_use]
 pub fn cut_json(cut: &[Cut]) -> Value {
-    let one = |Cut { name, strips, shown }: &Cut| match shown {
-        Shown::Line { length_km, farthest_km } => {
-            json!({ "line": name, "strips": strips, "length_km": length_km, "farthest_km": farthest_km })
-        }
+    let one = |Cut { name, strips, shown, left_out }: &Cut| match shown {
+        Shown::Line { length_km, farthest_km, too_short } => json!({
+            "line": name, "strips": strips, "length_km": length_km, "farthest_km": farthest_km,
+            "too_short": too_short, "left_out": left_out,
+        }),
         Shown::Area { square_km, covered, twice } => {
             json!({ "area": name, "strips": strips, "square_km": square_km, "covered": covered, "twice": twice })
         }

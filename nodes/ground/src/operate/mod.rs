@@ -1,5 +1,6 @@
-//! `swath strips` and `swath planner`: an operator's command line to a flying mission.
+//! `swath strips`, `swath planner` and `swath alarms`: an operator's command line to a flying mission.
 
+mod alarms;
 mod client;
 mod cover;
 mod export;
@@ -12,6 +13,7 @@ mod show;
 mod submit;
 mod watch;
 
+pub use alarms::{AlarmsArgs, run as run_alarms};
 pub use planner::{PlannerArgs, run as run_planner};
 
 use anyhow::Result;
@@ -37,7 +39,7 @@ enum StripsCommand {
     /// Make strips of the lines and areas of files, without a mission.
     #[command(after_help = "Examples:
   swath strips cover examples/requests/flood.geojson --out strips.geojson
-  ogr2ogr -f GeoJSONSeq /vsistdout/ lakes.gpkg | swath strips cover - --heading-deg 10")]
+  ogr2ogr -f GeoJSONSeq /vsistdout/ lakes.gpkg | swath strips cover - --rows 10")]
     Cover(cover::CoverArgs),
     /// Say when strips of a file, or a known one, could be imaged.
     #[command(after_help = "Example: swath strips preview examples/requests/fires.geojson --hours 6")]
@@ -54,6 +56,9 @@ enum StripsCommand {
     /// Take strips back; refused once imaging has begun.
     Cancel(submit::DecideArgs),
     /// Replace a strip, or a whole order, by the line or area of a file.
+    #[command(after_help = "Examples:
+  swath strips replace 1021 examples/requests/replacement.geojson
+  swath strips replace --ref mekong --submitter relief --whole-order examples/requests/river.gpx")]
     Replace(submit::ReplaceArgs),
     /// Keep accepted strips from being imaged until they are released.
     Hold(submit::DecideArgs),

@@ -11,10 +11,10 @@ use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files};
-use super::orders::Orders;
 use super::selection::Common;
 use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
 use crate::requests::json::status_json;
+use crate::requests::orders::Orders;
 use swath_mission::time_text;
 use swath_node::orders::request_message;
 use swath_node::out;

@@ -34,7 +34,7 @@ pub struct Common {
     reference: Option<String>,
     /// Only strips of this submitter
     #[arg(long)]
-    submitter: Option<String>,
+    pub submitter: Option<String>,
     /// Only strips whose name holds this regular expression
     #[arg(long)]
     name: Option<Regex>,
@@ -102,7 +102,13 @@ impl Selection {
     /// The strips of an order that are not over.
     #[must_use]
     pub fn of_order(order: u64) -> Self {
-        Self { ids: Vec::new(), common: Common { order: Some(order), ..Common::default() } }
+        Self::having(Common { order: Some(order), ..Common::default() })
+    }
+
+    /// Strips that have something in common.
+    #[must_use]
+    pub fn having(common: Common) -> Self {
+        Self { ids: Vec::new(), common }
     }
 
     /// The numbers that are meant; of two directions of a strip, one.

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files, cut_json, cut_text, write_file};
-use super::selection::{Actor, Selection};
+use super::selection::{Actor, Common, Selection};
 use super::show::print_result;
 use crate::requests::json::state_name;
 use swath_node::orders::request_message;
@@ -21,7 +21,8 @@ const BATCH: usize = 500;
 /// `swath strips submit`.
 #[derive(Debug, Args)]
 pub struct SubmitArgs {
-    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT or CSV.
+    /// Files with lines and areas, `-` for standard input: GeoJSON, KML, GPX, WKT, CSV, Shapefile, FlatGeobuf or
+    /// GeoPackage.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Who submits.
@@ -58,21 +59,42 @@ pub struct DecideArgs {
 /// `swath strips replace`.
 #[derive(Debug, Args)]
 pub struct ReplaceArgs {
-    /// Number of the strip, or of an order with --whole-order.
-    id: u64,
-    /// File with the line or area that is wanted instead.
-    file: PathBuf,
-    /// Replace all strips of the order of that number that are not over.
+    /// Number of the strip, or of an order with --whole-order; without it, --ref and so on say which. And the file with
+    /// the line or area that is wanted instead.
+    #[arg(required = true, num_args = 1..=2, value_names = ["ID", "FILE"])]
+    words: Vec<String>,
+    /// Replace all strips that are meant and not over, such as those of the order of that number.
     #[arg(long)]
     whole_order: bool,
     #[command(flatten)]
+    meant: Common,
+    #[command(flatten)]
     cutting: CuttingArgs,
-    /// Who submits.
-    #[arg(long, default_value = "operator")]
-    submitter: String,
     /// Print the answer as JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl ReplaceArgs {
+    /// What is meant by number, if anything is, and the file.
+    fn number_and_file(&self) -> Result<(Option<u64>, PathBuf)> {
+        let Some((file, number)) = self.words.split_last() else { bail!("a file is needed") };
+        let number = number.first().map(|it| it.parse().with_context(|| format!("{it} is no number of a strip")));
+        Ok((number.transpose()?, file.into()))
+    }
+
+    /// The strips that are replaced.
+    fn old(&self, number: Option<u64>, operator: &Operator) -> Result<Vec<u64>> {
+        let old = match number {
+            Some(order) if self.whole_order => Selection::of_order(order).find(operator)?,
+            Some(strip) => vec![strip],
+            None => Selection::having(self.meant.clone()).find(operator)?,
+        };
+        if old.len() > 1 && !self.whole_order {
+            bail!("{} strips are meant: --whole-order replaces all of them", old.len());
+        }
+        Ok(old)
+    }
 }
 
 /// Submits the strips of files, and reports what became of every line.
@@ -190,19 +212,21 @@ fn tell(args: &DecideArgs, ids: &[u64], done: &str, results: &[msg::SubmitResult
 /// # Errors
 /// When the file does not hold one line or area, or several strips for one, when nobody answers, or something is refused.
 pub fn replace(args: &ReplaceArgs, ros: &RosArgs) -> Result<()> {
-    let files = Files::read(std::slice::from_ref(&args.file))?;
+    let (number, file) = args.number_and_file()?;
+    let files = Files::read(std::slice::from_ref(&file))?;
     if files.shapes() != 1 {
-        bail!("{} holds {} lines and areas: one is needed in the place of one", args.file.display(), files.shapes());
+        bail!("{} holds {} lines and areas: one is needed in the place of one", file.display(), files.shapes());
     }
     let operator = Operator::start(ros)?;
     let mut import = files.cut(&args.cutting.of_mission(&operator)?);
+    let submitter = args.meant.submitter.clone().unwrap_or_else(|| "operator".to_owned());
     for order in &mut import.orders {
-        order.submitter.clone_from(&args.submitter);
+        order.submitter.clone_from(&submitter);
     }
     if !args.whole_order && import.orders.len() != 1 {
-        bail!("{} becomes {} strips: one is needed to replace one", args.file.display(), import.orders.len());
+        bail!("{} becomes {} strips: one is needed to replace one", file.display(), import.orders.len());
     }
-    let old = if args.whole_order { Selection::of_order(args.id).find(&operator)? } else { vec![args.id] };
+    let old = args.old(number, &operator)?;
     let desk = operator.desk(&graph::REPLACE_STRIP)?;
     let mut refused = import.refused.len();
     let mut tell = |name: &str, done: &str, result: &msg::SubmitResult| {
@@ -224,7 +248,7 @@ pub fn replace(args: &ReplaceArgs, ros: &RosArgs) -> Result<()> {
         }
     }
     if let Some(rest @ [_, ..]) = rest {
-        let (actor, reason) = (args.submitter.clone(), "its order was replaced".to_owned());
+        let (actor, reason) = (submitter, "its order was replaced".to_owned());
         let call = msg::CancelStripsRequest { ids: rest.to_vec(), actor, reason };
         let answer = operator.desk(&graph::CANCEL_STRIPS)?.call_once(Default::default(), call)?;
         check(answer.reason_code, &answer.reason)?;

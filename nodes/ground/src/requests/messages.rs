@@ -255,6 +255,9 @@ pub fn limits(cutting: &Cutting) -> msg::GetLimitsResponse {
         length_max_km: cutting.longest_km,
         swath_km: cutting.swath_km,
         earth_radius: cutting.radius_m,
+        inclination_deg: cutting.passes.inclination.to_degrees(),
+        mean_motion: cutting.passes.mean_motion,
+        earth_rotation: cutting.passes.earth_rotation,
     }
 }
 

@@ -4,6 +4,7 @@ mod desk;
 pub mod json;
 mod lock;
 pub mod messages;
+pub mod orders;
 mod outgoing;
 mod rows;
 pub mod store;

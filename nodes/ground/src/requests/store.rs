@@ -236,7 +236,6 @@ impl Store {
     }
 
     /// Whether it was written: it is not once another one writes here.
-
     fn write_transaction<'a>(
         &mut self,
         entries: impl Iterator<Item = &'a Entry>,

@@ -5,6 +5,7 @@ use swath_sim::vehicle::health::Health;
 
 use super::board::{Board, Key};
 use super::definitions::Severity;
+use super::wishes::Wish;
 use crate::faults::grammar::{Failure, Process, What};
 use crate::faults::plan::{FaultPlan, Scheduled};
 
@@ -37,12 +38,19 @@ impl Report {
 }
 
 /// Tells the board of reports, in the order of their ticks, and of the nodes' names at one tick, in which order ever they
-/// came.
-pub fn report_all(board: &mut Board, mut reports: Vec<Report>) {
+/// came; and of operators' wishes, each after the reports up to its tick.
+pub fn report_all(board: &mut Board, mut reports: Vec<Report>, wishes: &[Wish]) {
     reports.sort_by(|a, b| (a.tick, &a.key).cmp(&(b.tick, &b.key)));
+    let mut wishes = wishes.iter().peekable();
+    // A wish was followed when it came; what it met may have come in another order then.
+    let follow = |wish: &Wish, board: &mut Board| _ = wish.follow(board);
     for Report { tick, key, wrong, text } in reports {
+        while let Some(wish) = wishes.next_if(|wish| wish.tick < tick) {
+            follow(wish, board);
+        }
         board.report(tick, key, Severity::Error, wrong, &text);
     }
+    wishes.for_each(|wish| follow(wish, board));
 }
 
 /// What guidance reports of wheels and sensors.

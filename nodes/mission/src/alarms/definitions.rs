@@ -18,6 +18,9 @@ pub enum Severity {
 }
 
 impl Severity {
+    /// All of them, the gravest last.
+    pub const ALL: [Self; 3] = [Self::Warn, Self::Error, Self::Critical];
+
     /// Its name in files and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {

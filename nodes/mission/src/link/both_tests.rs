@@ -3,13 +3,13 @@
 use rand::RngExt as _;
 use swath_sim::config::SimConfig;
 use swath_sim::mission::horizon;
-use swath_sim::model::Model;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng::{self, Rng};
 use swath_sim::task::{FailureReason, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::{Flight, Situation};
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::strip::StripId;
 

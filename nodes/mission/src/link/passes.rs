@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 use swath_sim::config::station::Station;
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::contacts::{Contact, contacts_of};
 use swath_sim::world::orbit::Orbit;
 

@@ -1,9 +1,9 @@
 //! The radio channel: when it is open, how long a frame takes, and which frames are lost.
 
 use rand::RngExt as _;
-use swath_sim::model::Model;
 use swath_sim::rng;
 use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::contacts::{Contacts, View};
 use swath_sim::world::orbit::Orbit;
 

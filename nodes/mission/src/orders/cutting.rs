@@ -2,7 +2,9 @@
 
 use swath_sim::config::SimConfig;
 
-use crate::shapes::cover::{Cover, Polygon, Swath, cover};
+use super::rows::{Passes, Rows};
+use super::short_lines::{Numbered, ShortLines, joined};
+use crate::shapes::cover::{Cover, Headings, Polygon, Swath, cover};
 use crate::shapes::follow::{Limits, follow};
 use crate::shapes::sphere::{ANTIPODAL_ARC, Arc, Place, angle, direction, place};
 
@@ -17,10 +19,12 @@ pub struct Cutting {
     pub swath_km: f64,
     /// Greatest distance of a line from its strips [km].
     pub tolerance_km: f64,
-    /// Direction of the strips of an area at its middle, clockwise from north [deg]; none for the fewest strips.
-    pub heading_deg: Option<f64>,
-    /// Whether lines that are shorter than the shortest strip are stretched to its length.
-    pub stretch: bool,
+    /// Direction of the strips of an area.
+    pub rows: Rows,
+    /// The satellite's way over the ground.
+    pub passes: Passes,
+    /// What becomes of lines that are shorter than the shortest strip.
+    pub short_lines: ShortLines,
     /// Radius of the Earth [m].
     pub radius_m: f64,
 }
@@ -47,6 +51,13 @@ pub struct CutStrip {
     pub share: f64,
 }
 
+/// The boundary of an area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    rings: Vec<Vec<Place>>,
+    polygon: Polygon,
+}
+
 /// The strips of a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CutLine {
@@ -58,6 +69,8 @@ pub struct CutLine {
     pub farthest_km: f64,
     /// What is left out, and why.
     pub left_out: Vec<String>,
+    /// Whether its only strip is shorter than a strip may be.
+    pub too_short: bool,
 }
 
 impl Cutting {
@@ -69,8 +82,9 @@ impl Cutting {
             longest_km: config.requests.length_max_km,
             swath_km: SWATH_KM,
             tolerance_km: 0.5 * SWATH_KM,
-            heading_deg: None,
-            stretch: false,
+            rows: Rows::default(),
+            passes: Passes::of(config),
+            short_lines: ShortLines::default(),
             radius_m: config.earth.radius_m,
         }
     }
@@ -118,12 +132,27 @@ impl Cutting {
                 at(places[i + 1])
             )
         };
+        let strips: Vec<CutStrip> = strips.collect();
+        let short = |strip: &CutStrip| {
+            let length = angle(&direction(strip.start), &direction(strip.end));
+            length < self.angle_of(self.shortest_km) * (1.0 - CUT_SLACK)
+        };
         Ok(CutLine {
-            strips: strips.collect(),
+            too_short: strips.iter().any(short),
+            strips,
             length_km: self.km(total),
             farthest_km: self.km(followed.pieces.iter().map(|piece| piece.farthest).fold(0.0, f64::max)),
             left_out: followed.antipodal.iter().map(gap).collect(),
         })
+    }
+
+    /// The lines of a feature, those that are too short joined to others if that is wanted.
+    #[must_use]
+    pub fn lines(&self, lines: Vec<Numbered>) -> Vec<Numbered> {
+        match self.short_lines {
+            ShortLines::Join => joined(lines, self.angle_of(self.shortest_km), self.angle_of(self.tolerance_km)),
+            ShortLines::Refuse | ShortLines::Stretch => lines,
+        }
     }
 
     fn limits(&self) -> Limits {
@@ -137,7 +166,7 @@ impl Cutting {
     fn stretched(&self, strip: CutStrip) -> CutStrip {
         let least = self.angle_of(self.shortest_km);
         let arc = Arc::new(direction(strip.start), direction(strip.end));
-        match arc.filter(|arc| self.stretch && arc.length < least) {
+        match arc.filter(|arc| self.short_lines != ShortLines::Refuse && arc.length < least) {
             Some(arc) => {
                 let arc = arc.stretched(least);
                 CutStrip { start: place(&arc.start), end: place(&arc.end), ..strip }
@@ -146,22 +175,34 @@ impl Cutting {
         }
     }
 
+    /// An area as it is whoever wrote it.
+    ///
+    /// # Errors
+    /// When a place is none.
+    pub fn outline(&self, rings: &[Vec<Place>]) -> Result<Outline, String> {
+        let rings = in_order(rings);
+        let polygon = rings.iter().map(|ring| boundary(ring)).collect::<Result<Polygon, String>>()?;
+        Ok(Outline { rings, polygon })
+    }
+
     /// Covers areas as one: strips, each with the share of the area that it shows, and how well they cover it.
     ///
     /// # Errors
-    /// When a place is none, or the areas cannot be laid out.
-    pub fn area(&self, areas: &[&Vec<Vec<Place>>]) -> Result<(Vec<CutStrip>, Cover), String> {
-        let mut polygons = Vec::new();
-        for rings in areas {
-            let polygon: Result<Polygon, String> = rings.iter().map(|ring| boundary(ring)).collect();
-            polygons.push(polygon?);
-        }
+    /// When the areas cannot be laid out.
+    pub fn area(&self, mut areas: Vec<Outline>) -> Result<(Vec<CutStrip>, Cover), String> {
+        let first = |area: &Outline| area.rings.first().cloned().unwrap_or_default();
+        areas.sort_by(|a, b| order(&first(a), &first(b)));
+        let polygons: Vec<Polygon> = areas.into_iter().map(|area| area.polygon).collect();
         let swath = Swath {
             width: self.angle_of(self.swath_km),
             shortest: self.angle_of(self.shortest_km),
             longest: self.angle_of(self.longest_km),
             overlap: OVERLAP,
-            heading: self.heading_deg.map(f64::to_radians),
+            headings: match self.rows {
+                Rows::Fewest => Headings::Any,
+                Rows::Passes => Headings::At(&|latitude| self.passes.headings(latitude).to_vec()),
+                Rows::Heading(deg) => Headings::At(&move |_| vec![deg.to_radians()]),
+            },
         };
         let cover = cover(&polygons, &swath).map_err(|error| error.to_string())?;
         // A strip that shows nothing of its own is not worth a look, unless it is the only one.
@@ -176,6 +217,38 @@ impl Cutting {
     pub fn square_km(&self, cover: &Cover) -> f64 {
         cover.area * (self.radius_m / 1e3).powi(2)
     }
+}
+
+/// The rings of an area as they are whoever wrote them: without repeated points, each from its westernmost place on and
+/// in one sense, in the order of those places.
+fn in_order(rings: &[Vec<Place>]) -> Vec<Vec<Place>> {
+    let ring = |ring: &Vec<Place>| {
+        let turned = |place: &Place| {
+            let [longitude, latitude] = wrapped(*place);
+            [if longitude > 180.0 { longitude - 360.0 } else { longitude }, latitude]
+        };
+        let mut ring: Vec<Place> = ring.iter().map(turned).collect();
+        ring.dedup();
+        while ring.len() > 1 && ring.first() == ring.last() {
+            ring.pop();
+        }
+        let first = (0..ring.len()).min_by(|a, b| order(&ring[*a..=*a], &ring[*b..=*b])).unwrap_or(0);
+        ring.rotate_left(first);
+        if let [_, second, .., last] = ring[..]
+            && order(&[last], &[second]).is_lt()
+        {
+            ring[1..].reverse();
+        }
+        ring
+    };
+    let mut rings: Vec<_> = rings.iter().map(ring).collect();
+    rings.sort_by(|a, b| order(a, b));
+    rings
+}
+
+fn order(a: &[Place], b: &[Place]) -> std::cmp::Ordering {
+    let numbers = a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a.total_cmp(b));
+    numbers.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then).then(a.len().cmp(&b.len()))
 }
 
 /// A place whose longitude is brought to -180° to 180° when it is outside what a strip may say.
@@ -204,10 +277,13 @@ fn along_parallels_and_meridians(places: Vec<Place>) -> Vec<Place> {
         let at = |k: u32| [first[0] + (last[0] - first[0]) * f64::from(k) / f64::from(count), first[1]];
         return (0..=count).map(at).map(wrapped).collect();
     }
+    if !places.iter().all(is_on_earth) {
+        return places;
+    }
     let mut along = vec![first];
     for two in places.windows(2) {
         let [a, b] = [two[0], two[1]];
-        let opposite = places.iter().all(is_on_earth) && angle(&direction(a), &direction(b)) > ANTIPODAL_ARC;
+        let opposite = angle(&direction(a), &direction(b)) > ANTIPODAL_ARC;
         if opposite && a[0] == b[0] {
             along.push([a[0], f64::midpoint(a[1], b[1])]);
         }

@@ -1,8 +1,30 @@
 //! What a file of any format holds: features with properties and with lines and areas in degrees.
 
+use std::str::FromStr;
+
 use serde_json::{Map, Value};
 
 use crate::shapes::sphere::Place;
+
+/// Names of the properties that are understood.
+pub const PROPERTIES: [&str; 16] = [
+    "name",
+    "client_ref",
+    "submitter",
+    "priority",
+    "acquisition_speed_m_s",
+    "bidirectional",
+    "valid_from",
+    "valid_until",
+    "hold_for_approval",
+    "max_attempts",
+    "short_lines",
+    "rows",
+    "order_ref",
+    "part",
+    "parts",
+    "share",
+];
 
 /// A feature of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,6 +79,15 @@ impl Feature {
             }
             Some(value) => value.as_f64().map(Some).ok_or(format!("`{name}` must be a number")),
         }
+    }
+
+    /// A word or number that stands for a choice.
+    ///
+    /// # Errors
+    /// When it is none of the choices.
+    pub fn choice<T: FromStr<Err = String>>(&self, name: &str) -> Result<Option<T>, String> {
+        let text = self.text(&[name])?.filter(|text| !text.trim().is_empty());
+        text.map(|text| text.trim().parse().map_err(|error| format!("`{name}`: {error}"))).transpose()
     }
 
     /// A flag: true or false, 1 or 0, or such a text.

@@ -4,76 +4,14 @@ use std::fs::File;
 use std::io::{BufReader, Read, Write as _};
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest as _, Sha256};
-use swath_sim::world::strip::StripRequest;
 use thiserror::Error;
 
-use super::cutting::{CutStrip, Cutting};
-use super::feature::{Feature, Part};
-use super::formats::{self, FormatError};
+use super::cutting::Cutting;
+use super::formats::{self, Beside, Features, FormatError, Source};
+use super::found::{Fault, Import};
 use super::geojson::feature_of;
-use super::order::{MISSION, Order, Part as OrderPart};
-use crate::shapes::sphere::Place;
-use crate::time_text;
-
-/// What files of requests hold.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Import {
-    /// The strips, in the order of the files.
-    pub orders: Vec<Order>,
-    /// Lines and areas found.
-    pub shapes: usize,
-    /// What became of those that became several strips, or other strips than themselves.
-    pub cut: Vec<Cut>,
-    /// What is no strip.
-    pub refused: Vec<Fault>,
-}
-
-/// What became of a line or an area.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cut {
-    /// Its name.
-    pub name: String,
-    /// Its strips.
-    pub strips: usize,
-    /// How well they show it.
-    pub shown: Shown,
-}
-
-/// How well strips show what they were made from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shown {
-    /// A line.
-    Line {
-        /// Its length [km].
-        length_km: f64,
-        /// Its greatest distance from its strips [km].
-        farthest_km: f64,
-    },
-    /// An area.
-    Area {
-        /// Its size [km²].
-        square_km: f64,
-        /// Share of it that is shown.
-        covered: f64,
-        /// Share of it that is shown more than once.
-        twice: f64,
-    },
-}
-
-/// Something that is no strip.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("requests {path}, feature {feature}{}: {reason}", part.map_or_else(String::new, |part| format!(", part {part}")))]
-pub struct Fault {
-    /// The file.
-    pub path: String,
-    /// Number of the feature, from 1.
-    pub feature: usize,
-    /// Number of the part of the feature, from 1, if it has several.
-    pub part: Option<usize>,
-    /// What is wrong.
-    pub reason: String,
-}
+use super::order::Order;
+use super::template::{Template, take_feature};
 
 /// Why a file of requests cannot be used.
 #[derive(Debug, Error)]
@@ -112,19 +50,12 @@ pub enum RequestsFileError {
 
 /// Largest file of requests [MB]: about 100 000 strips.
 const LIMIT_MB: u64 = 100;
-/// Priority of a feature that gives none.
-const DEFAULT_PRIORITY: f64 = 0.5;
-/// Acquisition speed of a feature that gives none [m/s].
-const DEFAULT_SPEED_M_S: f64 = 3000.0;
-/// Names under which features have their names.
-const NAMES: [&str; 4] = ["name", "Name", "NAME", "title"];
-
 /// Reads requests from a file of any format that is read, `-` for standard input: lines are followed and areas are
 /// covered by strips. What is wrong costs itself alone, and all of it is told.
 ///
 /// Properties: `name`, `client_ref`, `submitter`, `priority` (0 to 1; of a feature that becomes several strips, each has
 /// its share), `acquisition_speed_m_s`, `bidirectional`, `valid_from` and `valid_until` (RFC 3339), `hold_for_approval`,
-/// `max_attempts`; of a strip that is part of an order, `order_ref`, `part`, `parts`, `share`.
+/// `max_attempts`, `rows`, `short_lines`; of a strip that is part of an order, `order_ref`, `part`, `parts`, `share`.
 ///
 /// # Errors
 /// When the file as a whole cannot be read.
@@ -136,7 +67,12 @@ pub fn import(path: &Path, cutting: &Cutting) -> Result<Import, RequestsFileErro
 ///
 /// # Errors
 /// When the file as a whole cannot be read.
-pub fn features(path: &Path) -> Result<formats::Features, RequestsFileError> {
+pub fn features(path: &Path) -> Result<Features, RequestsFileError> {
+    let source = Source { path: path.to_owned(), bytes: bytes(path)?, beside: beside(path)? };
+    formats::read(&source).map_err(|why| RequestsFileError::Format { path: path.to_owned(), why })
+}
+
+fn bytes(path: &Path) -> Result<Vec<u8>, RequestsFileError> {
     let unreadable = |source| RequestsFileError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     let limit = LIMIT_MB * 1_000_000 + 1;
@@ -149,18 +85,36 @@ pub fn features(path: &Path) -> Result<formats::Features, RequestsFileError> {
     if bytes.len() as u64 >= limit {
         return Err(RequestsFileError::TooLarge { path: path.to_owned() });
     }
-    formats::read(&bytes, path).map_err(|why| RequestsFileError::Format { path: path.to_owned(), why })
+    Ok(bytes)
+}
+
+/// What lies beside a Shapefile or a GeoPackage.
+fn beside(path: &Path) -> Result<Beside, RequestsFileError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let other = |path: PathBuf| path.is_file().then(|| bytes(&path)).transpose();
+    let mut beside = Beside::default();
+    if extension.eq_ignore_ascii_case("shp") {
+        let large = extension == "SHP";
+        let of = |kind: &str| other(path.with_extension(if large { kind.to_uppercase() } else { kind.to_owned() }));
+        (beside.table, beside.encoding, beside.reference_system) = (of("dbf")?, of("cpg")?, of("prj")?);
+    } else if extension.eq_ignore_ascii_case("gpkg") {
+        let mut log = path.as_os_str().to_owned();
+        log.push("-wal");
+        beside.log = other(log.into())?;
+    }
+    Ok(beside)
 }
 
 /// Makes orders of a file's features.
 #[must_use]
-pub fn import_features(features: formats::Features, path: &Path, cutting: &Cutting) -> Import {
+pub fn import_features(features: Features, path: &Path, cutting: &Cutting) -> Import {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut import = Import::default();
     for (number, feature) in (1..).zip(features) {
         let mut faults = Vec::new();
-        match feature.and_then(|feature| Template::new(&feature, &format!("{stem}-{number}")).map(|it| (feature, it))) {
-            Ok((feature, template)) => take_feature(&feature, &template, cutting, &mut import, &mut faults),
+        let name = format!("{stem}-{number}");
+        match feature.and_then(|feature| Template::new(&feature, &name, cutting).map(|template| (feature, template))) {
+            Ok((feature, template)) => take_feature(&feature, &template, &mut import, &mut faults),
             Err(reason) => faults.push((None, reason)),
         }
         let path = path.display().to_string();
@@ -185,199 +139,13 @@ pub fn write(path: &Path, orders: &[Order]) -> Result<(), RequestsFileError> {
     file.write_all(b"\n]}\n").and_then(|()| file.flush()).map_err(unwritable)
 }
 
-/// What the strips of a feature have in common.
-struct Template {
-    order: Order,
-    /// Whether the feature has a reference of its submitter's own.
-    referenced: bool,
-}
-
-impl Template {
-    fn new(feature: &Feature, fallback: &str) -> Result<Self, String> {
-        let time = |key: &str| match feature.text(&[key])? {
-            None => Ok(0),
-            Some(text) => time_text::parse(&text).map_err(|error| format!("`{key}`: {error}")),
-        };
-        let max_attempts = whole(feature, "max_attempts")?;
-        let client_ref = feature.text(&["client_ref"])?;
-        let request = StripRequest {
-            start_latitude_deg: 0.0,
-            start_longitude_deg: 0.0,
-            end_latitude_deg: 0.0,
-            end_longitude_deg: 0.0,
-            priority: feature.number("priority")?.unwrap_or(DEFAULT_PRIORITY),
-            acquisition_speed_m_s: feature.number("acquisition_speed_m_s")?.unwrap_or(DEFAULT_SPEED_M_S),
-            bidirectional: feature.flag("bidirectional")?,
-        };
-        let order = Order {
-            submitter: feature.text(&["submitter"])?.unwrap_or_else(|| MISSION.to_owned()),
-            valid_from_ns: time("valid_from")?,
-            valid_until_ns: time("valid_until")?,
-            hold_for_approval: feature.flag("hold_for_approval")?,
-            max_attempts,
-            part: part(feature)?,
-            ..Order::new(
-                client_ref.clone().unwrap_or_default(),
-                feature.text(&NAMES)?.unwrap_or_else(|| fallback.to_owned()),
-                request,
-            )
-        };
-        Ok(Self { order, referenced: client_ref.is_some_and(|text| !text.is_empty()) })
-    }
-
-    /// Orders for the strips of a feature's lines and areas: one order of several strips, or a strip that is one itself.
-    fn orders(&self, shapes: &[Shape]) -> Vec<Order> {
-        let total: f64 = shapes.iter().map(|shape| shape.worth).sum();
-        let requests: Vec<Vec<StripRequest>> = shapes
-            .iter()
-            .map(|shape| {
-                let worth = shape.worth / total;
-                shape.strips.iter().map(|strip| self.request(strip, strip.share * worth)).collect()
-            })
-            .collect();
-        let all = requests.concat();
-        let order_ref = if self.referenced { self.order.client_ref.clone() } else { self.identity(&all) };
-        let mut orders = Vec::new();
-        for (shape, requests) in shapes.iter().zip(requests) {
-            let suffix = &shape.suffix;
-            let reference = if self.referenced { format!("{order_ref}{suffix}") } else { self.identity(&requests) };
-            let count = requests.len();
-            for (k, (strip, request)) in (1..).zip(shape.strips.iter().zip(requests)) {
-                let piece = if count > 1 { format!(" {k}/{count}") } else { String::new() };
-                let (number, of) = (orders.len() as u32 + 1, all.len() as u32);
-                let share = strip.share * (shape.worth / total);
-                let part = OrderPart { order_ref: order_ref.clone(), number, of, share };
-                orders.push(Order {
-                    client_ref: format!("{reference}{piece}"),
-                    name: format!("{}{suffix}{piece}", self.order.name),
-                    request,
-                    part: if all.len() > 1 { Some(part) } else { self.order.part.clone() },
-                    ..self.order.clone()
-                });
-            }
-        }
-        orders
-    }
-
-    fn request(&self, strip: &CutStrip, share: f64) -> StripRequest {
-        StripRequest {
-            start_latitude_deg: strip.start[1],
-            start_longitude_deg: strip.start[0],
-            end_latitude_deg: strip.end[1],
-            end_longitude_deg: strip.end[0],
-            priority: self.order.request.priority * share,
-            ..self.order.request.clone()
-        }
-    }
-
-    /// A reference that is the same whenever the same is asked for, in whatever file and place.
-    fn identity(&self, requests: &[StripRequest]) -> String {
-        let mut hash = Sha256::new();
-        for request in requests {
-            let order = Order { name: String::new(), request: request.clone(), part: None, ..self.order.clone() };
-            hash.update(feature_of(&order).to_string());
-        }
-        let digits: String = hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-        format!("strip-{digits}")
-    }
-}
-
-fn whole(feature: &Feature, key: &str) -> Result<u32, String> {
-    let number = feature.number(key)?.unwrap_or(0.0);
-    if number.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&number) {
-        return Err(format!("`{key}` must be a whole number"));
-    }
-    Ok(number as u32)
-}
-
-/// Which part of an order a feature is, if it says so.
-fn part(feature: &Feature) -> Result<Option<OrderPart>, String> {
-    let Some(order_ref) = feature.text(&["order_ref"])?.filter(|text| !text.is_empty()) else { return Ok(None) };
-    let share = feature.number("share")?.unwrap_or(1.0);
-    Ok(Some(OrderPart { order_ref, number: whole(feature, "part")?, of: whole(feature, "parts")?, share }))
-}
-
-/// The strips of a line, or of a feature's areas.
-struct Shape {
-    strips: Vec<CutStrip>,
-    /// What it is worth beside the others of its feature: the ground that it shows [km²].
-    worth: f64,
-    /// Its number in its feature, behind a name.
-    suffix: String,
-    /// How well it is shown, when that is worth a word.
-    shown: Option<Shown>,
-}
-
-/// Takes the lines and areas of a feature; what is wrong with a part goes to `faults` with the part's number.
-fn take_feature(
-    feature: &Feature,
-    template: &Template,
-    cutting: &Cutting,
-    import: &mut Import,
-    faults: &mut Vec<(Option<usize>, String)>,
-) {
-    if feature.parts.is_empty() {
-        return faults.push((None, "it has no geometry".to_owned()));
-    }
-    let several = feature.parts.len() > 1;
-    let mut shapes = Vec::new();
-    let mut areas = Vec::new();
-    for (number, part) in (1..).zip(&feature.parts) {
-        let numbered = several.then_some(number);
-        match part {
-            Part::Line(line) => match line_shape(line, numbered, cutting) {
-                Ok((shape, left_out)) => {
-                    shapes.push(shape);
-                    faults.extend(left_out.into_iter().map(|reason| (numbered, reason)));
-                }
-                Err(reason) => faults.push((numbered, reason)),
-            },
-            Part::Area(rings) => areas.push(rings),
-            Part::Other(kind) => {
-                faults.push((numbered, format!("a {kind} is no strip: expected a line or an area")));
-            }
-        }
-    }
-    if !areas.is_empty() {
-        let lines = feature.parts.iter().any(|part| matches!(part, Part::Line(_)));
-        match area_shape(&areas, if lines { " area" } else { "" }, cutting) {
-            Ok(shape) => shapes.push(shape),
-            Err(reason) => faults.push((None, reason)),
-        }
-    }
-    import.shapes += shapes.len();
-    import.orders.extend(template.orders(&shapes));
-    let cut = shapes.iter().filter_map(|shape| {
-        let name = format!("{}{}", template.order.name, shape.suffix);
-        Some(Cut { name, strips: shape.strips.len(), shown: shape.shown? })
-    });
-    import.cut.extend(cut);
-}
-
-fn line_shape(line: &[Place], number: Option<usize>, cutting: &Cutting) -> Result<(Shape, Vec<String>), String> {
-    let cut = cutting.line(line)?;
-    let bent = cut.strips.len() > 1 || cut.farthest_km > 0.01;
-    let shape = Shape {
-        shown: bent.then_some(Shown::Line { length_km: cut.length_km, farthest_km: cut.farthest_km }),
-        worth: cut.length_km.max(cutting.shortest_km) * cutting.swath_km,
-        strips: cut.strips,
-        suffix: number.map_or_else(String::new, |number| format!(" {number}")),
-    };
-    Ok((shape, cut.left_out))
-}
-
-fn area_shape(areas: &[&Vec<Vec<Place>>], suffix: &str, cutting: &Cutting) -> Result<Shape, String> {
-    let (strips, cover) = cutting.area(areas)?;
-    let square_km = cutting.square_km(&cover);
-    let shown = Some(Shown::Area { square_km, covered: cover.covered, twice: cover.twice });
-    Ok(Shape { strips, worth: square_km.max(f64::MIN_POSITIVE), suffix: suffix.to_owned(), shown })
-}
-
 #[cfg(test)]
 mod tests {
     use swath_sim::config::SimConfig;
 
     use super::*;
+    use crate::orders::order::{MISSION, Part as OrderPart};
+    use crate::orders::template::DEFAULT_SPEED_M_S;
     use crate::shapes::sphere::{angle, direction};
 
     const EARTH_KM: f64 = 6378.1366;

@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 
 use swath_sim::mission::windows_until;
-use swath_sim::model::Model;
 use swath_sim::requests::catalogue::Entry as Listed;
 use swath_sim::requests::catalogue::{Candidate, Catalogue, Prepared};
 use swath_sim::task::TaskRecord;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;

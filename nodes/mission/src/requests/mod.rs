@@ -12,7 +12,7 @@ pub mod refusal;
 pub mod register;
 pub mod request;
 pub mod restart;
-mod settle;
+mod reward;
 mod sharing;
 
 #[cfg(test)]

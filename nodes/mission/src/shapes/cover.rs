@@ -8,9 +8,18 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::sphere::{Arc, angle};
 
+/// Which directions rows may have at an area's middle.
+#[derive(Clone, Copy)]
+pub enum Headings<'a> {
+    /// Any: the one with the fewest strips is taken.
+    Any,
+    /// The one with the fewest strips of those at the middle's latitude [rad], clockwise from north [rad].
+    At(&'a dyn Fn(f64) -> Vec<f64>),
+}
+
 /// How an area is covered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Swath {
+#[derive(Clone, Copy)]
+pub struct Swath<'a> {
     /// Width of what a strip shows [rad].
     pub width: f64,
     /// Shortest strip [rad].
@@ -19,8 +28,8 @@ pub struct Swath {
     pub longest: f64,
     /// Share of the width that neighbouring rows both show.
     pub overlap: f64,
-    /// Direction of the rows at the area's middle, clockwise from north [rad]; none for the one with the fewest strips.
-    pub heading: Option<f64>,
+    /// Direction of the rows.
+    pub headings: Headings<'a>,
 }
 
 /// A polygon: its rings, the outer one and those of holes, in any order and sense, without their last points, which are
@@ -59,6 +68,8 @@ const LARGE: f64 = 0.25;
 const HEADINGS: u32 = 18;
 /// Points at which what is shown is counted, about.
 const SAMPLES: f64 = 20_000.0;
+/// Such points across a swath, at least: every strip has to have its share.
+const WITHIN_SWATH: f64 = 3.0;
 /// Least distance of those points [rad]: about 60 m, so that slivers cost no more than other areas.
 const FINEST: f64 = 1e-5;
 /// Most points of an edge that is cut into straight parts.
@@ -68,35 +79,47 @@ const CUTS_MAX: f64 = 10_000.0;
 ///
 /// # Errors
 /// When the area is empty or larger than can be laid out.
-pub fn cover(polygons: &[Polygon], swath: &Swath) -> Result<Cover, CoverError> {
+pub fn cover(polygons: &[Polygon], swath: &Swath<'_>) -> Result<Cover, CoverError> {
     let points = || polygons.iter().flatten().flatten();
     let middle = points().sum::<Vector3<f64>>().try_normalize(1e-9).ok_or(CoverError::Empty)?;
     let radius = points().map(|point| angle(&middle, point)).fold(0.0, f64::max);
     if radius > RADIUS_MAX {
         return Err(CoverError::TooLarge);
     }
-    let lay = |along: Vector3<f64>| Layout::new(polygons, middle, along, swath);
-    let layout = match swath.heading {
-        Some(heading) => lay(turned(&middle, north(&middle), heading)),
-        None => {
+    let directions: Vec<Vector3<f64>> = match swath.headings {
+        Headings::At(headings) => {
+            let headings = headings(libm::asin(middle.z.clamp(-1.0, 1.0)));
+            headings.into_iter().map(|heading| turned(&middle, north(&middle), heading)).collect()
+        }
+        Headings::Any => {
             // From a direction of the area's own, so that it is covered alike wherever it lies.
             let far = points().max_by(|a, b| angle(&middle, a).total_cmp(&angle(&middle, b)));
             let far = far.and_then(|far| tangent(&middle, far)).ok_or(CoverError::Empty)?;
             // Where most strips are of full length, the direction changes little.
             let count = if radius > LARGE { 2 } else { HEADINGS };
             let turns = (0..count).map(|i| std::f64::consts::PI * f64::from(i) / f64::from(count));
-            let directions = turns.map(|turn| turned(&middle, far, turn)).chain(longer_axis(polygons, &middle, &far));
-            let cost = |layout: &Layout| {
-                let rows = layout.rows(swath);
-                (rows.len(), rows.iter().map(|row| row.east - row.west).sum::<f64>())
-            };
-            let layouts = directions.map(lay).map(|layout| (cost(&layout), layout));
-            let best = layouts.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-            best.map(|(_, layout)| layout).ok_or(CoverError::Empty)?
+            turns.map(|turn| turned(&middle, far, turn)).chain(longer_axis(polygons, &middle, &far)).collect()
         }
     };
+    let layout = cheapest(polygons, middle, directions, swath).ok_or(CoverError::Empty)?;
     let arcs: Vec<_> = layout.rows(swath).iter().filter_map(|row| layout.strip(row, swath)).collect();
     layout.count(arcs, swath).ok_or(CoverError::Empty)
+}
+
+/// The layout along one of several directions that needs fewest strips; of those, the one with the shortest.
+fn cheapest(
+    polygons: &[Polygon],
+    middle: Vector3<f64>,
+    directions: Vec<Vector3<f64>>,
+    swath: &Swath<'_>,
+) -> Option<Layout> {
+    let cost = |layout: &Layout| {
+        let rows = layout.rows(swath);
+        (rows.len(), rows.iter().map(|row| row.east - row.west).sum::<f64>())
+    };
+    let layouts = directions.into_iter().map(|along| Layout::new(polygons, middle, along, swath));
+    let costs = layouts.map(|layout| (cost(&layout), layout));
+    costs.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, layout)| layout)
 }
 
 /// The direction in which an area's boundary extends most, if it has one; `along` is any direction at its middle.
@@ -151,7 +174,7 @@ struct Row {
 }
 
 impl Layout {
-    fn new(polygons: &[Polygon], middle: Vector3<f64>, along: Vector3<f64>, swath: &Swath) -> Self {
+    fn new(polygons: &[Polygon], middle: Vector3<f64>, along: Vector3<f64>, swath: &Swath<'_>) -> Self {
         let across = middle.cross(&along);
         let dcm_AE = Matrix3::from_rows(&[middle.transpose(), along.transpose(), across.transpose()]);
         let mut layout = Self { dcm_AE, edges: Vec::new(), south: f64::INFINITY, north: f64::NEG_INFINITY };
@@ -163,7 +186,7 @@ impl Layout {
         layout
     }
 
-    fn add_ring(&mut self, polygon: usize, ring: &[Vector3<f64>], swath: &Swath) {
+    fn add_ring(&mut self, polygon: usize, ring: &[Vector3<f64>], swath: &Swath<'_>) {
         for (i, a) in ring.iter().enumerate() {
             let b = &ring[(i + 1) % ring.len()];
             // A great circle is straight in λ and φ as long as it is short.
@@ -220,7 +243,7 @@ impl Layout {
     }
 
     /// The strips of all rows.
-    fn rows(&self, swath: &Swath) -> Vec<Row> {
+    fn rows(&self, swath: &Swath<'_>) -> Vec<Row> {
         let step = swath.width * (1.0 - swath.overlap);
         let height = self.north - self.south;
         let count = (((height - swath.width) / step).ceil().max(0.0) as usize) + 1;
@@ -273,14 +296,14 @@ impl Layout {
     }
 
     /// Longest strip of a row: a great circle leaves its parallel by length²/8·tan φ, and what rows share must hold it.
-    fn longest(&self, phi: f64, swath: &Swath) -> f64 {
+    fn longest(&self, phi: f64, swath: &Swath<'_>) -> f64 {
         let bulge = swath.overlap * swath.width;
         let within = (8.0 * bulge / libm::tan(phi.abs()).max(1e-9)).sqrt();
         swath.longest.min(within).max(swath.shortest)
     }
 
     /// The strip of a row: half of it above its parallel, half below; one that is too short gets the least length.
-    fn strip(&self, row: &Row, swath: &Swath) -> Option<Arc> {
+    fn strip(&self, row: &Row, swath: &Swath<'_>) -> Option<Arc> {
         let bulge = libm::atan(libm::tan(row.phi) / libm::cos(0.5 * (row.east - row.west))) - row.phi;
         let phi = row.phi - 0.5 * bulge;
         let arc = Arc::new(self.direction(row.west, phi), self.direction(row.east, phi));
@@ -293,7 +316,7 @@ impl Layout {
     }
 
     /// Counts at a lattice of points of the area what strips show.
-    fn count(&self, arcs: Vec<Arc>, swath: &Swath) -> Option<Cover> {
+    fn count(&self, arcs: Vec<Arc>, swath: &Swath<'_>) -> Option<Cover> {
         // First how large it is, then a lattice as fine as that allows.
         let lines = |step: f64| {
             let count = ((self.north - self.south) / step).ceil().max(1.0) as usize;
@@ -312,7 +335,8 @@ impl Layout {
         if area.is_nan() || area <= 0.0 {
             return None;
         }
-        let step = out_of_step((area / SAMPLES).sqrt().max(FINEST), swath.width * (1.0 - swath.overlap));
+        let step = (area / SAMPLES).sqrt().max(FINEST).min(swath.width / WITHIN_SWATH);
+        let step = out_of_step(step, swath.width * (1.0 - swath.overlap));
         let index = Rows::new(&arcs, |direction| self.place(direction)[1], self.south, swath.width);
         let (mut all, mut covered, mut twice) = (0.0, 0.0, 0.0);
         let mut shares = vec![0.0; arcs.len()];
@@ -347,6 +371,10 @@ fn out_of_step(step: f64, rows: f64) -> f64 {
 /// Whether a strip shows a point.
 #[must_use]
 pub fn shows(arc: &Arc, point: &Vector3<f64>, width: f64) -> bool {
+    // A sine is less than its angle: most points are told to be outside without asking for that.
+    if arc.normal().dot(point).abs() > 0.5 * width {
+        return false;
+    }
     let (across, along) = arc.across_along(point);
     across.abs() <= 0.5 * width && (0.0..=arc.length).contains(&along)
 }
@@ -401,149 +429,5 @@ fn nearer_than(mut intervals: Vec<[f64; 2]>, gap: f64) -> Vec<[f64; 2]> {
 }
 
 #[cfg(test)]
-mod tests {
-    use nalgebra::{Rotation3, Unit};
-    use proptest::prelude::*;
-
-    use super::super::sphere::direction;
-    use super::*;
-
-    const EARTH_KM: f64 = 6378.1366;
-
-    fn swath() -> Swath {
-        Swath {
-            width: 12.0 / EARTH_KM,
-            shortest: 20.0 / EARTH_KM,
-            longest: 500.0 / EARTH_KM,
-            overlap: 0.06,
-            heading: None,
-        }
-    }
-
-    fn ring(places: &[[f64; 2]]) -> Vec<Vector3<f64>> {
-        places.iter().map(|place| direction(*place)).collect()
-    }
-
-    /// A star about a place: distances of its points [km].
-    fn star(middle: [f64; 2], radii_km: &[f64]) -> Vec<Vector3<f64>> {
-        let at = direction(middle);
-        let along = north(&at);
-        let point = |(i, radius): (usize, &f64)| {
-            let along = turned(&at, along, std::f64::consts::TAU * i as f64 / radii_km.len() as f64);
-            at * (radius / EARTH_KM).cos() + along * (radius / EARTH_KM).sin()
-        };
-        radii_km.iter().enumerate().map(point).collect()
-    }
-
-    /// Whether a point lies in a star-shaped or convex ring: it sees an odd number of edges on its way to a far point.
-    fn inside(ring: &[Vector3<f64>], point: &Vector3<f64>, outside: &Vector3<f64>) -> bool {
-        let Some(way) = Arc::new(*point, *outside) else { return false };
-        let edges = (0..ring.len()).filter_map(|i| Arc::new(ring[i], ring[(i + 1) % ring.len()]));
-        let crosses = |edge: &Arc| {
-            let side = |arc: &Arc, p: &Vector3<f64>| arc.normal().dot(p) > 0.0;
-            side(edge, &way.start) != side(edge, &way.end) && side(&way, &edge.start) != side(&way, &edge.end)
-        };
-        edges.filter(crosses).count() % 2 == 1
-    }
-
-    /// Shares of an area that strips show at all and more than once, by points thrown at it.
-    fn looked_at(polygon: &Polygon, cover: &Cover, middle: [f64; 2], radius_km: f64) -> (f64, f64) {
-        let (at, mut all, mut once, mut twice) = (direction(middle), 0, 0, 0);
-        let far = turned(&at, north(&at), 1.0) * 1.0_f64.sin() + at * 1.0_f64.cos();
-        for i in 0..16_000 {
-            // Fibonacci's spiral fills the cap evenly.
-            let cos = 1.0 - (1.0 - (radius_km / EARTH_KM).cos()) * (f64::from(i) + 0.5) / 16_000.0;
-            let along = turned(&at, north(&at), 2.399_963 * f64::from(i));
-            let point = at * cos + along * (1.0 - cos * cos).max(0.0).sqrt();
-            if polygon.iter().filter(|ring| inside(ring, &point, &far)).count() % 2 == 1 {
-                let seen = cover.strips.iter().filter(|(arc, _)| shows(arc, &point, swath().width)).count();
-                all += 1;
-                once += i32::from(seen > 0);
-                twice += i32::from(seen > 1);
-            }
-        }
-        (f64::from(once) / f64::from(all), f64::from(twice) / f64::from(all))
-    }
-
-    #[test]
-    fn a_rectangle_is_covered_along_its_longer_side() {
-        let side = 4.5; // degrees of a great circle, 501 km
-        let rectangle = vec![ring(&[[0.0, 0.0], [side, 0.0], [side, 0.3], [0.0, 0.3]])];
-        let cover = cover(std::slice::from_ref(&rectangle), &swath()).unwrap();
-        assert!(cover.covered > 0.995 && cover.twice < 0.10, "{} {}", cover.covered, cover.twice);
-        assert_eq!(cover.strips.len(), 6, "three rows of 12 km, each in two");
-        let area = 4.5_f64.to_radians() * 0.3_f64.to_radians().sin();
-        assert!((cover.area / area - 1.0).abs() < 1e-3, "{} {area}", cover.area);
-        let shares: f64 = cover.strips.iter().map(|(_, share)| share).sum();
-        assert!((shares - cover.covered).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_hole_is_left_out_and_what_lies_in_two_polygons_counts_once() {
-        let outer = star([179.5, 60.0], &[300.0; 40]);
-        let whole = cover(&[vec![outer.clone()]], &swath()).unwrap();
-        let holed: Polygon = vec![outer.clone(), star([179.5, 60.0], &[200.0; 40])];
-        let with_hole = cover(std::slice::from_ref(&holed), &swath()).unwrap();
-        assert!((with_hole.area / whole.area - 5.0 / 9.0).abs() < 0.01);
-        let length = |cover: &Cover| cover.strips.iter().map(|(arc, _)| arc.length).sum::<f64>();
-        assert!(length(&with_hole) < 0.75 * length(&whole));
-        let (shown, twice) = looked_at(&holed, &with_hole, [179.5, 60.0], 310.0);
-        assert!(shown > 0.99 && twice < 0.15, "{shown} {twice}");
-        let double = cover(&[vec![outer.clone()], vec![outer]], &swath()).unwrap();
-        assert_eq!(double.strips.len(), whole.strips.len());
-        assert!((double.area / whole.area - 1.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn rows_follow_a_heading_that_is_given() {
-        let square = star([20.0, 50.0], &[100.0, 100.0, 100.0, 100.0]);
-        let cover = cover(&[vec![square]], &Swath { heading: Some(0.5), ..swath() }).unwrap();
-        for (arc, _) in &cover.strips {
-            let north = north(&arc.start);
-            let along = tangent(&arc.start, &arc.end).unwrap();
-            let heading = along.dot(&north.cross(&arc.start)).atan2(along.dot(&north));
-            assert!((heading - 0.5).abs() < 0.05, "{heading}");
-        }
-    }
-
-    #[test]
-    fn what_is_no_area_is_refused() {
-        assert_eq!(cover(&[], &swath()), Err(CoverError::Empty));
-        let line = vec![ring(&[[0.0, 0.0], [1.0, 0.0]])];
-        assert_eq!(cover(&[line], &swath()), Err(CoverError::Empty));
-        let half = vec![ring(&[[0.0, 0.0], [120.0, 0.0], [-120.0, 10.0]])];
-        assert!(cover(&[half], &swath()).is_err());
-    }
-
-    fn stars() -> impl Strategy<Value = ([f64; 2], Vec<f64>, Option<f64>)> {
-        let place = (-180.0..180.0, -90.0..=90.0).prop_map(|(longitude, latitude)| [longitude, latitude]);
-        let place = prop_oneof![place, Just([180.0, 10.0]), Just([0.0, 90.0]), Just([-90.0, -89.5])];
-        (place, prop::collection::vec(40.0..500.0, 3..12), prop::option::of(0.2..0.9))
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
-
-        #[test]
-        fn areas_are_covered_without_much_overlap((middle, radii, hole) in stars()) {
-            let outer = star(middle, &radii);
-            let mut polygon = vec![outer];
-            polygon.extend(hole.map(|hole| star(middle, &radii.iter().map(|radius| radius * hole).collect::<Vec<_>>())));
-            let cover = cover(std::slice::from_ref(&polygon), &swath()).unwrap();
-            prop_assert!(cover.strips.iter().all(|(arc, _)| (20.0 - 1e-3..=500.0 + 1e-3).contains(&(arc.length * EARTH_KM))));
-            prop_assert!(cover.covered > 0.99 && cover.twice < 0.15, "{} {}", cover.covered, cover.twice);
-            let (shown, twice) = looked_at(&polygon, &cover, middle, 500.0);
-            prop_assert!((shown - cover.covered).abs() < 0.02 && (twice - cover.twice).abs() < 0.06, "{} {}", shown, twice);
-        }
-
-        #[test]
-        fn a_turned_globe_is_covered_alike((middle, radii, _) in stars(), angle in 0.0..6.0, axis in (0.0..1.0, -1.0..1.0)) {
-            let outer = star(middle, &radii);
-            let turn = Rotation3::from_axis_angle(&Unit::new_normalize(Vector3::new(axis.0, axis.1, 0.5)), angle);
-            let turned = outer.iter().map(|point| turn * point).collect();
-            let (one, other) = (cover(&[vec![outer]], &swath()).unwrap(), cover(&[vec![turned]], &swath()).unwrap());
-            prop_assert_eq!(one.strips.len(), other.strips.len());
-            prop_assert!((one.covered - other.covered).abs() < 1e-3);
-        }
-    }
-}
+#[path = "cover_tests.rs"]
+mod tests;

@@ -6,7 +6,7 @@ use axum::Extension;
 use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use swath_mission::orders::import::{Fault, Import};
+use swath_mission::orders::found::{Fault, Import};
 use swath_mission::requests::lifecycle::State as Stage;
 use swath_msgs::swath_msgs as msg;
 use utoipa::ToSchema;

@@ -18,7 +18,7 @@ use super::recorded::RecordedArgs;
 #[command(after_help = "Example:
   swath report bags/samples/mission -o out/report.html
 
-The page holds the ground track and the strips on a map, the tasks over time, attitude error, wheel speeds and
+The page holds the ground track and the strips on a map, the share imaged of orders, the tasks over time, attitude error, wheel speeds and
 torques, reward, request states, and each decision with its candidates.")]
 pub struct ReportArgs {
     #[command(flatten)]

@@ -28,6 +28,7 @@ pub fn page(recorded: &Recorded, story: &Story) -> Result<String> {
          <title>{name}: mission report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n"
     );
     facts(&mut html, recorded, story);
+    orders(&mut html, story);
     plots(&mut html, story)?;
     tasks(&mut html, story);
     decisions(&mut html, recorded);
@@ -59,6 +60,29 @@ fn facts(html: &mut String, recorded: &Recorded, story: &Story) {
         ("reward", format!("{:.3}", totals.reward)),
     ] {
         _ = writeln!(html, "<tr><th>{name}</th><td>{}</td></tr>", escaped(&value));
+    }
+    *html += "</table>\n";
+}
+
+/// What share of each line and area is imaged.
+fn orders(html: &mut String, story: &Story) {
+    if story.orders.is_empty() {
+        return;
+    }
+    *html += "<h2>Orders</h2>\n<table id=\"orders\">\n<tr><th>order</th><th>submitter</th><th>strips</th>\
+              <th>priority</th><th>imaged</th><th>reward</th></tr>\n";
+    for order in &story.orders {
+        _ = writeln!(
+            html,
+            "<tr><td>{} {}</td><td>{}</td><td>{}</td><td>{:.3}</td><td>{:.1} %</td><td>{:.3}</td></tr>",
+            order.order_id,
+            escaped(&order.name),
+            escaped(&order.submitter),
+            order.strips,
+            order.priority,
+            100.0 * order.imaged,
+            order.reward,
+        );
     }
     *html += "</table>\n";
 }

@@ -1,6 +1,7 @@
 //! What a report tells: a recorded mission in numbers that can be plotted.
 
 use anyhow::Result;
+use swath_mission::outcome::OrderOutcome;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
 use swath_sim::config::RAD_S_PER_RPM;
@@ -9,6 +10,7 @@ use crate::debrief::export::track::Track;
 use crate::debrief::places::{Place, strip_places};
 use crate::debrief::recorded::Recorded;
 use crate::requests::json::state_name;
+use crate::requests::orders::Orders;
 
 /// Time between points of the ground track [s].
 const TRACK_STEP_S: f64 = 10.0;
@@ -34,6 +36,8 @@ pub struct Story {
     pub tasks: Vec<Task>,
     /// Every strip that was accepted.
     pub strips: Vec<Strip>,
+    /// Lines and areas that became several strips.
+    pub orders: Vec<OrderOutcome>,
     /// The points below the satellite.
     pub track: Vec<Place>,
     /// ‖σ_BR‖.
@@ -112,6 +116,7 @@ impl Story {
             wheel_torque_max_Nm: config.spacecraft.wheel_torque_max_nm,
             tasks: tasks(recorded),
             strips: strips(recorded),
+            orders: Orders::of(recorded.last_events().into_values().cloned()).outcomes(),
             track: track.points.iter().map(|point| point.place).collect(),
             attitude_error: thinned(&attitude_error),
             wheel_speed: wheel_speed.map(|points| thinned(&points)),

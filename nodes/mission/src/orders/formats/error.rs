@@ -33,7 +33,12 @@ pub enum FormatError {
         /// The format.
         format: &'static str,
     },
+    /// It belongs to a Shapefile and is not the file that tells of its places.
+    #[error("belongs to a Shapefile: the .shp beside it is read")]
+    Beside,
     /// Nobody knows what it is.
-    #[error("is of no format that is known: GeoJSON, KML, GPX, WKT and CSV are read")]
+    #[error(
+        "is of no format that is known: GeoJSON, KML, GPX, WKT, CSV, Shapefile, FlatGeobuf and GeoPackage are read"
+    )]
     Unknown,
 }

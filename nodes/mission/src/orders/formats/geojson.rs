@@ -4,6 +4,7 @@ use geojson::{Feature as GeoFeature, Geometry, GeometryValue, Position};
 use serde_json::Value;
 
 use super::super::feature::{Feature, Part};
+use super::crs;
 use super::error::{Features, FormatError};
 use crate::shapes::sphere::Place;
 
@@ -23,9 +24,7 @@ pub(super) fn read(text: &str) -> Result<Features, FormatError> {
     }
     let mut features = Vec::new();
     for value in texts {
-        if let Some(crs) = foreign_crs(&value) {
-            return Err(FormatError::Crs { crs });
-        }
+        check_crs(&value)?;
         collect(value, &mut features)?;
     }
     Ok(features)
@@ -89,11 +88,11 @@ fn places(line: &[Position]) -> Vec<Place> {
     line.iter().map(|position| [at(position, 0), at(position, 1)]).collect()
 }
 
-/// The name of a reference system that is not WGS 84.
-fn foreign_crs(value: &Value) -> Option<String> {
-    let crs = value.get("crs").filter(|crs| !crs.is_null())?;
-    let name = crs.pointer("/properties/name").and_then(Value::as_str).map_or_else(|| crs.to_string(), str::to_owned);
-    let code = name.rsplit([':', '/']).next().unwrap_or_default();
-    let known = ["CRS84", "CRS84h", "4326", "4979"];
-    (!known.contains(&code)).then_some(name)
+/// Refuses a reference system that is not WGS 84.
+fn check_crs(value: &Value) -> Result<(), FormatError> {
+    let Some(crs) = value.get("crs").filter(|crs| !crs.is_null()) else { return Ok(()) };
+    match crs.pointer("/properties/name").and_then(Value::as_str) {
+        Some(name) => crs::by_code(name),
+        None => crs::by_code(&crs.to_string()),
+    }
 }

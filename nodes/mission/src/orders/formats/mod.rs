@@ -1,46 +1,77 @@
-//! Files as they come: GeoJSON, text sequences of it, KML, GPX, WKT and CSV, told apart by what is in them.
+//! Files as they come, in formats that are told apart by what is in them.
 
+mod crs;
 mod csv;
 mod error;
+mod flatgeobuf;
 mod geojson;
+mod gpkg;
 mod gpx;
 mod kml;
+mod shapefile;
+mod source;
+mod wkb;
 mod wkt;
 
-use std::path::Path;
-
 pub use error::{Features, FormatError};
+pub use source::{Beside, Source};
 
 /// How the files of formats that are not read begin.
-const UNREAD: [(&[u8], &str); 6] = [
-    (b"\x00\x00\x27\x0a", "a shapefile"),
-    (b"SQLite format 3", "a GeoPackage or another SQLite file"),
-    (b"fgb", "FlatGeobuf"),
-    (b"PK\x03\x04", "a ZIP archive, such as KMZ"),
+const UNREAD: [(&[u8], &str); 5] = [
+    (b"PK\x03\x04", "a ZIP archive, such as KMZ or a packed Shapefile"),
     (b"\x1f\x8b", "compressed by gzip"),
     (b"PAR1", "GeoParquet"),
+    (b"!table", "MapInfo TAB"),
+    (b"  0\n", "DXF"),
 ];
+/// Words of XML and JSON texts of formats that are not read.
+const UNREAD_TEXTS: [(&str, &str); 4] = [
+    ("opengis.net/gml", "GML"),
+    ("<osm", "OpenStreetMap XML"),
+    ("\"Topology\"", "TopoJSON"),
+    ("\"esriGeometry", "Esri JSON"),
+];
+/// Where in a text those words stand.
+const HEAD_LENGTH: usize = 2000;
 
-/// Reads the features of a file; the ending of `path` helps where the text does not tell.
+/// Reads the features of a file.
 ///
 /// # Errors
 /// When the file as a whole cannot be read.
-pub fn read(bytes: &[u8], path: &Path) -> Result<Features, FormatError> {
+pub fn read(source: &Source) -> Result<Features, FormatError> {
+    let bytes = &source.bytes;
+    let extension = source.path.extension().map(|it| it.to_string_lossy().to_lowercase()).unwrap_or_default();
     if let Some((_, format)) = UNREAD.iter().find(|(begin, _)| bytes.starts_with(begin)) {
         return Err(FormatError::Unread { format });
     }
-    let text = String::from_utf8_lossy(bytes);
+    if ["shx", "dbf"].contains(&extension.as_str()) {
+        return Err(FormatError::Beside);
+    }
+    if bytes.starts_with(shapefile::MAGIC) {
+        return shapefile::read(source);
+    }
+    if bytes.starts_with(gpkg::MAGIC) {
+        return gpkg::read(source);
+    }
+    if bytes.starts_with(flatgeobuf::MAGIC) {
+        return flatgeobuf::read(bytes);
+    }
+    read_text(&String::from_utf8_lossy(bytes), &extension)
+}
+
+fn read_text(text: &str, extension: &str) -> Result<Features, FormatError> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    let extension = path.extension().map(|it| it.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let head: String = text.chars().take(HEAD_LENGTH).collect();
+    let unread = UNREAD_TEXTS.iter().find(|(word, _)| head.contains(word));
     match text.chars().next() {
-        Some('{' | '[' | '\u{1e}') => geojson::read(text),
         Some('<') if text.contains("<gpx") => gpx::read(text),
         Some('<') if text.contains("<kml") || extension == "kml" => kml::read(text),
-        Some('<') if text.contains("opengis.net/gml") => Err(FormatError::Unread { format: "GML" }),
+        Some('<' | '{') if let Some((_, format)) = unread => Err(FormatError::Unread { format }),
+        Some('{' | '[' | '\u{1e}') => geojson::read(text),
         _ if wkt::is_one(text) => wkt::read(text),
-        _ if ["csv", "tsv"].contains(&extension.as_str()) || csv::is_one(text) => csv::read(text),
+        _ if ["csv", "tsv"].contains(&extension) || csv::is_one(text) => csv::read(text),
         // What calls itself GeoJSON is told what is wrong with it.
-        _ if ["geojson", "json", "geojsons", "geojsonl"].contains(&extension.as_str()) => geojson::read(text),
+        _ if ["geojson", "json", "geojsons", "geojsonl"].contains(&extension) => geojson::read(text),
         _ => Err(FormatError::Unknown),
     }
 }

@@ -1,4 +1,4 @@
-//! What becomes of a request when its task has ended.
+//! What becomes of a request when its task has ended, and what that is worth.
 
 use swath_sim::task::{FailureReason, TaskRecord};
 use swath_sim::time::Tick;
