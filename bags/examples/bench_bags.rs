@@ -2,13 +2,14 @@
 //!
 //! Recording takes two further processes: `bench_bags record DIR` and `bench_bags publish RATE N`;
 //! playing, alone with `bench_bags play`, takes `bench_bags play BAG RATE` and `bench_bags listen N`. With CycloneDDS on
-//! the other side, in Python, `bench_bags cyclone` measures both.
+//! the other side, in Python, `bench_bags cyclone` measures both; and with a reader in C, where CycloneDDS is installed
+//! (under `CYCLONEDDS_HOME`, or with ROS 2).
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that cannot go on should panic")]
 
 use std::collections::BTreeMap;
 use std::env;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -116,11 +117,12 @@ fn measure_cyclone(dir: &Path) -> Value {
         (played, untaken(reader))
     };
     let ((steady, steady_lost), (fast, fast_lost)) = (play("1"), play("0"));
+    let in_c = measure_reader_in_c(dir, &bag);
     // What the same reader takes of a writer of its own kind: with a depth of 10 it keeps no more until Python takes them.
     let reader = peer("read", PLAYED);
     last_line(peer("write", PLAYED));
     let reference_lost = untaken(reader);
-    json!({
+    let mut result = json!({
         "record_bursts_lost": RECORDED - recorded["messages"].as_u64().unwrap(),
         "play_cyclone_late_p99_ms": steady["late_p99_ms"],
         "play_cyclone_lost": steady_lost,
@@ -128,7 +130,51 @@ fn measure_cyclone(dir: &Path) -> Value {
         "play_cyclone_of_cyclone_lost": reference_lost,
         "play_cyclone_refused": PLAYED - steady["published"].as_u64().unwrap(),
         "play_cyclone_msgs_per_s": (PLAYED as f64 / fast["seconds"].as_f64().unwrap()).round(),
+    });
+    if let (Value::Object(all), Value::Object(part)) = (&mut result, in_c) {
+        all.extend(part);
+    }
+    result
+}
+
+/// The same bag played to a reader of depth 10 in C that takes each sample where it comes in: what is missing has not come.
+fn measure_reader_in_c(dir: &Path, bag: &Path) -> Value {
+    let Some(program) = reader_in_c(dir) else { return json!({}) };
+    let play = |rate: &str| {
+        let mut reader = Command::new(&program);
+        reader.args([DOMAIN, &PLAYED.to_string()]).stdout(Stdio::piped());
+        let reader = reader.spawn().unwrap();
+        let played = last_line(this(&["play", bag.to_str().unwrap(), rate]));
+        let taken = last_line(reader);
+        (PLAYED.saturating_sub(taken["taken"].as_u64().unwrap()), taken["unsent"].clone(), played)
+    };
+    let ((steady_lost, unsent, steady), (fast_lost, fast_unsent, fast)) = (play("1"), play("0"));
+    json!({
+        "play_cyclone_c_late_p99_ms": steady["late_p99_ms"],
+        "play_cyclone_c_lost": steady_lost,
+        "play_cyclone_c_unsent": unsent,
+        "play_cyclone_c_fast_lost": fast_lost,
+        "play_cyclone_c_fast_unsent": fast_unsent,
+        "play_cyclone_c_msgs_per_s": (PLAYED as f64 / fast["seconds"].as_f64().unwrap()).round(),
     })
+}
+
+/// Builds that reader; nothing without CycloneDDS and a compiler.
+fn reader_in_c(dir: &Path) -> Option<PathBuf> {
+    let homes = ["CYCLONEDDS_HOME", "AMENT_PREFIX_PATH"].map(|name| env::var(name).unwrap_or_default());
+    let mut homes = homes.iter().flat_map(|homes| homes.split(':')).map(Path::new);
+    let home = homes.find(|home| home.join("include/dds/dds.h").exists() && home.join("bin/idlc").exists())?;
+    let (source, include, library) =
+        (Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c"), home.join("include"), home.join("lib"));
+    let mut idlc = Command::new(home.join("bin/idlc"));
+    idlc.env("LD_LIBRARY_PATH", &library).arg(source.join("String.idl")).current_dir(dir);
+    let program = dir.join("cyclone_reader");
+    let mut cc = Command::new("cc");
+    cc.args(["-O2", "-I."]).arg("-I").arg(&include).arg("-I").arg(include.join("ddsc"));
+    cc.arg(source.join("cyclone_reader.c")).arg("String.c").arg("-L").arg(&library).arg("-lddsc");
+    cc.arg(format!("-Wl,-rpath,{}", library.display())).arg("-o").arg(&program).current_dir(dir);
+    let built = [idlc, cc].iter_mut().all(|step| step.status().is_ok_and(|status| status.success()));
+    built.then_some(program)
 }
 
 /// This program in another role.

@@ -6,8 +6,8 @@ use swath_sim::learn::observation::{
     DENSITY_SCALE, MOMENTUM_SCALE, ORBIT_SCALE_S, ObservationSet, RATE_SCALE, WINDOW_SCALE_S,
 };
 use swath_sim::mission::{horizon, windows_until};
-use swath_sim::model::Model;
 use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::model::Model;
 
 /// Slack for the rounding to 32 bits.
 const ROUNDING: f64 = 1e-5;

@@ -6,12 +6,12 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use swath_sim::learn::observation::{ObservationSet, observe};
-use swath_sim::model::Model;
 use swath_sim::planner::DecisionContext;
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{Duty, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Situation;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::frames::{earth_to_inertial, latitude_longitude_deg};
 use swath_sim::world::orbit::Orbit;
 

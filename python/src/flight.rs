@@ -6,7 +6,7 @@ use pythonize::pythonize;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use swath_sim::error::SimError;
-use swath_sim::learn::score::Score;
+use swath_sim::learn::statistics::Score;
 use swath_sim::planner::PlannerError;
 use swath_sim::task::{SettledTask, Totals};
 

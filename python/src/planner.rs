@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, PlannerSpec};
+use swath_sim::vehicle::model::Model;
 
 use crate::context::{Context, Image, Serve, Wait};
 use crate::errors::refused;

@@ -12,8 +12,8 @@ use swath_sim::config::SimConfig;
 use swath_sim::error::SimError;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
-use swath_sim::model::Model;
 use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripRequest;
 use toml::{Table, Value};
 

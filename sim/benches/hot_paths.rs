@@ -8,7 +8,6 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Heuristic, Planner};
 use swath_sim::requests::catalogue::Catalogue;
 use swath_sim::requests::scenario::ScenarioConfig;
@@ -16,6 +15,7 @@ use swath_sim::rng;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 use swath_sim::world::orbit::Orbit;
 

@@ -14,7 +14,7 @@
 //!
 //! use swath_sim::config::SimConfig;
 //! use swath_sim::learn::episode::{Env, EpisodeConfig};
-//! use swath_sim::model::Model;
+//! use swath_sim::vehicle::model::Model;
 //! use swath_sim::planner::PlannerSpec;
 //! use swath_sim::task::Totals;
 //!
@@ -36,7 +36,6 @@ pub mod error;
 pub mod foresight;
 pub mod learn;
 pub mod mission;
-pub mod model;
 pub mod planner;
 pub mod requests;
 pub mod rng;

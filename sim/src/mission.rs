@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::Model;
 use crate::planner::{Decision, DecisionContext, Planner, PlannerError, Shield};
 use crate::requests::catalogue::Candidate;
 use crate::task::{Duty, SettledTask, TaskRecord};
@@ -12,6 +11,7 @@ use crate::time::Tick;
 use crate::vehicle::executive::Executive;
 use crate::vehicle::flight::{Flight, Situation};
 use crate::vehicle::health::Health;
+use crate::vehicle::model::Model;
 use crate::vehicle::resources::{Failure, Onboard};
 
 /// Whoever keeps the requests of a mission.
@@ -140,6 +140,12 @@ impl<K: RequestKeeper> Mission<K> {
     #[must_use]
     pub fn keeper(&self) -> &K {
         &self.keeper
+    }
+
+    /// Whoever keeps the requests, to be told what goes on while a task is flown; [`Self::change`] is for what changes
+    /// what may be imaged.
+    pub fn keeper_mut(&mut self) -> &mut K {
+        &mut self.keeper
     }
 
     /// What came to the ground so far.

@@ -17,13 +17,22 @@ pub const ARRIVALS: u64 = 4;
 /// Stream of the faults that a mission leaves to its seed.
 pub const FAULTS: u64 = 5;
 
-/// First of the streams of a planner that draws at random, one for each task; all other streams lie below it.
+/// First of the streams of a planner that draws at random, one for each task; other streams lie below it, but for those
+/// of the radio.
 const PLANNER: u64 = 1 << 32;
+/// First of the streams of the radio, two for each tick.
+const RADIO: u64 = 1 << 62;
 
 /// Stream of a planner that draws at random, for a task.
 #[must_use]
 pub fn planner(seed: u64, task: u64) -> Rng {
     stream(seed, PLANNER.saturating_add(task))
+}
+
+/// Stream of the frames that are lost on their way up, or down, of those sent at a tick.
+#[must_use]
+pub fn radio(seed: u64, tick: u64, up: bool) -> Rng {
+    stream(seed, RADIO.saturating_add(tick.saturating_mul(2)).saturating_add(u64::from(up)))
 }
 
 /// Stream `number` of a seed.
@@ -47,5 +56,9 @@ mod tests {
         for task in 0..100 {
             assert!(!fixed.contains(&first(planner(7, task))), "task {task}");
         }
+        let radio: Vec<u64> = (0..200).map(|it| first(radio(7, it / 2, it % 2 == 1))).collect();
+        let mut others: Vec<u64> = (0..100).map(|task| first(planner(7, task))).chain(fixed).chain(radio).collect();
+        others.sort_unstable();
+        assert!(others.windows(2).all(|two| two[0] != two[1]), "two uses draw the same");
     }
 }

@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::Planner;
+use swath_sim::vehicle::model::Model;
 use swath_training::checkpoint;
 use swath_training::config::{EnvironmentConfig, RunConfig};
 use swath_training::policy::{LearnedPlanner, Policy};

@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::Planner;
 use swath_sim::task::Totals;
 use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::model::Model;
 
 use crate::error::{Result, TrainingError};
 use crate::planners::Prepared;
 
-pub use swath_sim::learn::score::Score as Mission;
+pub use swath_sim::learn::statistics::Score as Mission;
 
 /// Which missions to fly.
 #[derive(Debug, Clone, PartialEq)]

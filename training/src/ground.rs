@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use swath_sim::foresight::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::model::Model;
 
 use crate::error::Result;
 use crate::evaluate::{Mission, Missions, attempted, mission};

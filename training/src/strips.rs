@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use swath_sim::learn::hybrid::Episode;
-use swath_sim::model::Model;
 use swath_sim::planner::PlannerSpec;
+use swath_sim::vehicle::model::Model;
 
 use crate::config::StripsConfig;
 use crate::environment::{Action, Environment, ObservationShape, Outcome};

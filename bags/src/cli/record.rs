@@ -69,6 +69,9 @@ pub struct RecordArgs {
     /// Record only topics of Swath's node graph, do not look for others
     #[arg(long)]
     graph_only: bool,
+    /// Leave out the topics of missions in other namespaces
+    #[arg(long)]
+    own_mission_only: bool,
     /// Give messages the time of their coming instead of the simulated time that they carry
     #[arg(long)]
     wall_time: bool,
@@ -179,6 +182,7 @@ impl RecordArgs {
                 (false, false) => Discovery::Always,
             },
             hidden: self.include_hidden_topics,
+            own_mission_only: self.own_mission_only,
             clock: match (self.wall_time, self.use_sim_time) {
                 (true, _) => TapClock::Wall,
                 (false, true) => TapClock::SimulatedLater,

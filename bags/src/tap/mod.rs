@@ -46,6 +46,8 @@ pub struct Selection {
     pub discovery: Discovery,
     /// Whether hidden topics count, which have a name with a part that begins with `_`.
     pub hidden: bool,
+    /// Whether the topics of missions in other namespaces are passed over.
+    pub own_mission_only: bool,
     /// The time that messages are given.
     pub clock: TapClock,
     /// Messages that a subscription keeps until they are taken; more at once are lost.
@@ -284,11 +286,15 @@ impl Tap {
             }
         }
         for ((name, type_name), offers) in offers {
-            if !self.selects(&name) || self.sources.iter().any(|source| source.topic.name == name) {
+            let foreign = self.selection.own_mission_only && is_of_a_mission(&name, &type_name);
+            if foreign || !self.selects(&name) || self.sources.iter().any(|source| source.topic.name == name) {
                 self.passed_over.insert(name);
                 continue;
             }
-            let offered = ros_qos::to_bag(&ros_qos::to_read(&offers, 1));
+            let mut offered = ros_qos::to_bag(&ros_qos::to_read(&offers, 1));
+            // Whoever plays it writes with it, while what is read should not be lost for being late.
+            let lifespans = offers.iter().map(|offer| offer.lifespan);
+            offered.lifespan = lifespans.min_by_key(|it| (it.sec, it.nsec)).unwrap_or(offered.lifespan);
             if let Err(error) = self.subscribe(&name, &type_name, offered, None) {
                 tracing::warn!("{name} is not recorded: {}", chain(&error));
                 self.passed_over.insert(name);
@@ -329,6 +335,18 @@ impl Tap {
 /// Whether a name has a part that begins with `_`, as ROS 2 names what is not for everybody.
 pub(crate) fn is_hidden(topic: &str) -> bool {
     topic.split('/').any(|part| part.starts_with('_'))
+}
+
+/// Whether a mission in some namespace has this topic for itself.
+fn is_of_a_mission(topic: &str, type_name: &str) -> bool {
+    graph::TOPICS.iter().any(|entry| {
+        let (own, name) = match entry.name.strip_prefix('/') {
+            // Of these, a mission has only its clock for itself, where it has a namespace.
+            Some(name) => (entry.name == graph::CLOCK.entry.name, name),
+            None => (true, entry.name),
+        };
+        own && entry.type_name == type_name && topic.strip_suffix(name).is_some_and(|before| before.ends_with('/'))
+    })
 }
 
 fn hand_over(message: &Taken, times: Times, sink: &mut dyn Sink) -> Result<()> {

@@ -5,6 +5,7 @@ mod common;
 
 mod commands;
 mod conformance;
+mod cyclone;
 mod damage;
 mod foreign;
 mod kill;

@@ -48,8 +48,10 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     let states = node.publisher(&graph::SPACECRAFT_STATE).unwrap();
     let frames = node.publisher(&graph::TF).unwrap();
     let upcoming = node.publisher(&graph::UPCOMING_STRIPS).unwrap();
-    let reliable = QosProfile::publisher_default().history(History::KeepLast { depth: 100 });
-    let foreign = node.raw_publisher("/foreign", "foreign_msgs/msg/Thing", &reliable).unwrap();
+    let passing = QosProfile::publisher_default()
+        .history(History::KeepLast { depth: 100 })
+        .lifespan(Some(Duration::from_secs(10)));
+    let foreign = node.raw_publisher("/foreign", "foreign_msgs/msg/Thing", &passing).unwrap();
     upcoming.publish(&UpcomingStrips::default()).unwrap();
     wait_until("the recorder listens", || {
         clock.matched() * states.matched() * frames.matched() * upcoming.matched() * foreign.matched() > 0
@@ -82,6 +84,8 @@ fn topics_of_the_graph_and_others_are_recorded_in_simulated_time() {
     assert!(bag.topics().iter().all(|topic| topic.topic.name != "/rosout"));
     let upcoming = bag.topics().iter().find(|t| t.topic.name == "/swath/requests/upcoming").unwrap();
     assert_eq!(upcoming.topic.qos, [swath_bags::qos::QosProfile::latched(1)]);
+    let foreign = bag.topics().iter().find(|t| t.topic.name == "/foreign").unwrap();
+    assert_eq!(foreign.topic.qos[0].lifespan, swath_bags::qos::QosDuration { sec: 10, nsec: 0 });
 }
 
 #[test]
@@ -203,6 +207,29 @@ fn the_options_of_ros2_bag_record() {
     let names: Vec<String> =
         Bag::open(&temp.path().join("hidden")).unwrap().topics().iter().map(|t| t.topic.name.clone()).collect();
     assert_eq!(names, ["/a/_hidden", "/late"]);
+}
+
+#[test]
+fn topics_of_missions_in_other_namespaces_are_left_out_if_asked_for() {
+    let temp = tempfile::tempdir().unwrap();
+    let node = node(51);
+    let reliable = QosProfile::publisher_default().reliability_reliable(WhenFull::Wait(PATIENCE));
+    let publisher = |name: &str, type_name: &str| node.raw_publisher(name, type_name, &reliable).unwrap();
+    let (state, clock) = (graph::SPACECRAFT_STATE.entry.type_name, graph::CLOCK.entry.type_name);
+    // The last ones are no topics of a mission.
+    let own = publisher("/swath/spacecraft/state", state);
+    let others = [("/sat2/spacecraft/state", state), ("/sat2/clock", clock)].map(|(name, kind)| publisher(name, kind));
+    let free =
+        [("/sat2/own/state", state), ("/sat2/spacecraft/state_2", clock)].map(|(name, kind)| publisher(name, kind));
+    let recorder = recorder(51, temp.path(), &["--own-mission-only"]);
+    wait_until("the recorder listens", || own.matched() * free[0].matched() * free[1].matched() > 0);
+    std::thread::sleep(Duration::from_millis(700));
+    assert_eq!(others.each_ref().map(|publisher| publisher.matched()), [0, 0]);
+    assert!(recorder.interrupt().0.success());
+    // Who does not ask for it has them all.
+    let all = Program::start(51, temp.path(), &["record", "-o", "all"]);
+    wait_until("the recorder listens", || others[0].matched() * others[1].matched() > 0);
+    assert!(all.interrupt().0.success());
 }
 
 /// A sink that keeps everything in memory.

@@ -45,6 +45,8 @@ fn type_hashes_are_those_of_ros_2() {
         ("swath_msgs/msg/StripReport", "c258448b77b7a230a9c5f0ce6ea791529830dd879ea121f32c2dc172ff2582e0"),
         ("swath_msgs/msg/PlannerStatus", "693426a82532062a8b00ee5e42990f5cf4ae24c3595d168cefbb1cc1fc42e501"),
         ("swath_msgs/msg/Decision", "6cf2e48f3726d92af6cb2751a1f9f66fc0e245b7cf45938fba0eeedc9f0e6219"),
+        ("swath_msgs/msg/StandingAlarms", "73fcc18a42bdcf338356ef212b5d62b8a7bbc7687c52759ecc5c2a2ded7e6079"),
+        ("swath_msgs/msg/AlarmEvent", "34c0791c3ef9652609ec8b24ed54fe5cda353bbc0411eb92cc67edb5d80601ba"),
         ("swath_msgs/msg/UpcomingStrips", "85f1f6c705dd469a2336343601f3c88e50235420c6d1857e61fa7d695185ed23"),
     ] {
         assert_eq!(type_hash_for(type_name), Some(format!("RIHS01_{hash}").as_str()), "{type_name}");

@@ -2,8 +2,10 @@
 //! afterwards.
 #![expect(non_snake_case, reason = "frame letters")]
 
+pub mod alarms;
 pub mod debrief;
 pub mod launch;
 pub mod operate;
+pub mod passes;
 pub mod place;
 pub mod requests;

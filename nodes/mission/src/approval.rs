@@ -9,7 +9,7 @@ use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
 
-use crate::guarded::GuardedPlanner;
+use crate::fallback::GuardedPlanner;
 
 /// What the planner may do by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -323,7 +323,7 @@ mod tests {
 
     use swath_sim::config::SimConfig;
     use swath_sim::learn::episode::{Env, EpisodeConfig};
-    use swath_sim::model::Model;
+    use swath_sim::vehicle::model::Model;
 
     use super::*;
 

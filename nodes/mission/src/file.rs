@@ -8,7 +8,6 @@ use swath_sim::config::SimConfig;
 use swath_sim::config::resources::ResourcesConfig;
 use swath_sim::error::SimError;
 use swath_sim::mission::horizon;
-use swath_sim::model::Model;
 use swath_sim::planner::PlannerSpec;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
@@ -16,12 +15,15 @@ use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::faults::{Fault as VehicleFault, TimedFault};
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::Spacecraft;
+use swath_sim::world::orbit::Orbit;
 use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
 use crate::approval::ApprovalConfig;
 use crate::faults::{FaultPlan, FaultPlanError};
+use crate::link::config::{LinkConfig, LinkConfigError};
 use crate::orders::cutting::{Cutting, SWATH_KM};
 use crate::orders::found::Fault;
 use crate::orders::import::{RequestsFileError, import};
@@ -73,6 +75,9 @@ pub enum MissionError {
     /// Faults that cannot be flown.
     #[error("mission setting faults: {0}")]
     Faults(#[from] FaultPlanError),
+    /// A radio that cannot be flown.
+    #[error("mission setting link: {0}")]
+    Link(#[from] LinkConfigError),
     /// A file of requests cannot be used.
     #[error(transparent)]
     Requests(#[from] RequestsFileError),
@@ -119,6 +124,9 @@ pub struct Mission {
     /// What fails on the way.
     #[serde(skip_serializing_if = "FaultPlan::is_empty")]
     pub faults: FaultPlan,
+    /// The radio between ground and satellite; without it the ground is always connected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkConfig>,
     /// What the launcher does about nodes that end or hang.
     #[serde(skip_serializing_if = "is_usual")]
     pub supervision: SupervisionConfig,
@@ -185,6 +193,7 @@ impl Default for Mission {
             resources: None,
             plant: PlantErrors::default(),
             faults: FaultPlan::default(),
+            link: None,
             supervision: SupervisionConfig::default(),
         }
     }
@@ -216,7 +225,19 @@ impl Mission {
     /// When a setting is out of range.
     pub fn stations_never_seen(&self) -> Result<Vec<NeverSeen>, MissionError> {
         let model = self.model()?;
-        Ok(model.stations.iter().filter_map(|station| station.never_seen(&model.config)).collect())
+        let mut unseen: Vec<_> =
+            model.stations.iter().filter_map(|station| station.never_seen(&model.config)).collect();
+        if let Some(link) = &self.link {
+            unseen.extend(link.never_seen(&model.config)?);
+        }
+        unseen.dedup();
+        Ok(unseen)
+    }
+
+    /// The satellite's orbit.
+    #[must_use]
+    pub fn orbit(&self, model: &Model) -> Orbit {
+        Orbit::new(&model.config, self.initial().orbit, model.period)
     }
 
     /// Checks every setting's range.
@@ -251,6 +272,9 @@ impl Mission {
         }
         self.plant.validate()?;
         self.sim.validate()?;
+        if let Some(link) = &self.link {
+            link.validate(&self.sim)?;
+        }
         if !self.faults.is_empty() {
             let model = self.model()?;
             self.faults.validate(self.horizon(&model), model.period)?;
@@ -416,6 +440,18 @@ mod tests {
         let error = parse("[requests]\nrows = \"north\"").unwrap_err();
         assert!(error.contains("`north` is neither `fewest`, `passes` nor a heading"), "{error}");
         assert!(parse("[requests]\nshort_lines = \"melt\"").unwrap_err().contains("unknown variant `melt`"));
+    }
+
+    #[test]
+    fn a_link_is_read_checked_and_written() {
+        let text = "[link]\nstations = [\"weilheim\", \"svalbard\"]\nloss = 0.2\nuplink_bps = 64000\n";
+        let mission = parse(text).unwrap();
+        assert_eq!(mission.link.as_ref().map(|link| (link.loss, link.stations.len())), Some((0.2, 2)));
+        assert_eq!(parse(&toml::to_string(&mission).unwrap()), Ok(mission.clone()));
+        let unseen = mission.stations_never_seen().unwrap();
+        assert_eq!(unseen.iter().map(|it| it.name.as_str()).collect::<Vec<_>>(), ["svalbard"]);
+        let error = parse("[link]\nstations = [\"tokyo\"]\nuplink_bps = 0").unwrap_err();
+        assert_eq!(error, "mission setting link: uplink_bps is 0, outside 100 to 10000000000");
     }
 
     #[test]

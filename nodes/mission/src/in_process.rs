@@ -3,23 +3,26 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use swath_sim::mission::{Mission as Loop, RequestKeeper};
-use swath_sim::model::Model;
+use swath_sim::mission::Mission as Loop;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
-use swath_sim::requests::catalogue::Candidate;
-use swath_sim::task::{SettledTask, TaskRecord};
+use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
-use swath_sim::vehicle::flight::{Flight, Situation};
-use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
 use crate::alarms::Board;
-use crate::alarms::conditions::{Report, back, of_health, of_plan, of_planner, report_all};
+use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, report_all};
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
+use crate::keeper::Keeper;
+use crate::link::apart::Apart;
+use crate::link::ground::WayLine;
+use crate::link::response::LinkSummary;
 use crate::orders::action::Action;
 use crate::outcome::{ResourcesSummary, TaskLine};
+use crate::requests::journal::InFlight;
 use crate::requests::logic::RequestLogic;
 use crate::requests::refusal::Refusal;
 
@@ -34,80 +37,9 @@ pub enum InProcessError {
     Planner(#[from] PlannerError),
 }
 
-/// The request manager of a mission in one process, and what is asked of it on the way.
-#[derive(Clone, Debug)]
-pub struct Desk {
-    requests: RequestLogic,
-    /// When it is lost and when it is back, in order; the last one may be under way.
-    away: VecDeque<(Tick, Tick)>,
-    /// What another one is made of.
-    origin: (InitialState, Tick),
-    /// What is still to come, in order.
-    to_come: VecDeque<Action>,
-    refused: Vec<(Action, Refusal)>,
-}
-
-impl Desk {
-    fn take_while(&mut self, due: impl Fn(&Action) -> bool) {
-        while let Some(action) = self.to_come.pop_front_if(|action| due(action)) {
-            if let Err(refusal) = self.requests.take_again(&action) {
-                self.refused.push((action, refusal));
-            }
-        }
-    }
-}
-
-impl Desk {
-    /// Whether nobody is at the desk; who comes back to it knows what was written down.
-    fn away(&mut self, now: Tick) -> bool {
-        while let Some(&(from, until)) = self.away.front() {
-            if now < from {
-                return false;
-            }
-            if now < until {
-                return true;
-            }
-            self.away.pop_front();
-            let (initial, horizon) = &self.origin;
-            match self.requests.restarted(initial, *horizon) {
-                Ok(fresh) => self.requests = fresh,
-                // Its strips were taken under the same limits.
-                Err(refusal) => tracing::error!("the request manager cannot be made again: {refusal}"),
-            }
-        }
-        false
-    }
-}
-
-impl RequestKeeper for Desk {
-    fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
-        if self.away(situation.now) {
-            // The planner goes on with what it was offered, as far as that can still be imaged.
-            let open = |it: &Candidate| {
-                it.window.close >= situation.now && self.requests.state(it.id).is_some_and(|state| !state.is_final())
-            };
-            candidates.retain(open);
-            return;
-        }
-        self.requests.set_situation(*situation);
-        *candidates = self.requests.on_decision_point(task, situation.now, &[]).candidates;
-        for contradiction in self.requests.take_contradictions() {
-            tracing::error!("{contradiction}");
-        }
-        // Nobody keeps a journal here.
-        self.requests.take_journal();
-    }
-
-    fn settle(&mut self, record: &TaskRecord) -> f64 {
-        // What came while the task was flown counts before its result does.
-        self.take_while(|action| action.at < record.end);
-        self.requests.on_result(record)
-    }
-}
-
 /// A mission ready to be flown in this process: the loop of the simulation around the request manager of the nodes.
 pub struct InProcessMission {
-    mission: Loop<Desk>,
+    mission: Loop<Keeper>,
     requested: usize,
     faults: Troubles,
     board: Board,
@@ -132,25 +64,17 @@ impl InProcessMission {
         mission.faults.fits_one_process().map_err(MissionError::from)?;
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
-        let mut requests = RequestLogic::new((*model).clone(), &mission.initial(), horizon, mission.rules());
         let (initial, faults) = mission.initial_requests()?;
         faults.iter().for_each(|fault| tracing::warn!("{fault}"));
         let requested = initial.len();
-        for order in initial {
-            // Why one is refused is in the request manager's counts.
-            _ = requests.submit(order, Tick(0));
-        }
         let faults = Troubles::new(mission, model.period);
-        let away = faults.requests.clone();
-        let origin = (mission.initial(), horizon);
-        let mut desk = Desk { requests, away, origin, to_come: actions.into(), refused: Vec::new() };
-        desk.take_while(|action| action.initial);
+        let keeper = Keeper::new(mission, &model, initial, actions, faults.requests.clone())?;
         let mut flight = Flight::new(&model, mission.spacecraft(&model)?);
         flight.watch(&model, mission.plant.noisy());
         let delay = model.period.ticks_ceil(mission.plant.planning_delay_s);
         let board = Board::new(model.period);
         let to_report = of_plan(&mission.faults, model.period).into();
-        let mut mission = Loop::new(model, flight, desk, horizon);
+        let mut mission = Loop::new(model, flight, keeper, horizon);
         mission.set_planning_delay(delay);
         Ok(Self { mission, requested, faults, board, to_report })
     }
@@ -166,22 +90,43 @@ impl InProcessMission {
         self.mission.model()
     }
 
-    /// The request manager.
+    /// The requests that decide what is flown: with a radio, those on board.
     #[must_use]
     pub fn requests(&self) -> &RequestLogic {
-        &self.mission.keeper().requests
+        match self.mission.keeper() {
+            Keeper::Together(desk) => &desk.requests,
+            Keeper::Apart(apart) => apart.space().requests(),
+        }
+    }
+
+    /// Ground, radio and satellite, in a mission with `[link]`.
+    #[must_use]
+    pub fn link(&self) -> Option<&Apart> {
+        match self.mission.keeper() {
+            Keeper::Together(_) => None,
+            Keeper::Apart(apart) => Some(apart),
+        }
+    }
+
+    /// Each request and its way over the radio, in a mission with `[link]`.
+    #[must_use]
+    pub fn ways(&self) -> Vec<WayLine> {
+        self.link().map(|apart| apart.ground().lines().collect()).unwrap_or_default()
     }
 
     /// What was asked for and refused, and why.
     #[must_use]
     pub fn refused(&self) -> &[(Action, Refusal)] {
-        &self.mission.keeper().refused
+        match self.mission.keeper() {
+            Keeper::Together(desk) => &desk.refused,
+            Keeper::Apart(apart) => apart.refused(),
+        }
     }
 
     /// Strips asked for at the start, and strips that were not refused.
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
-        (self.requested, self.requests().len())
+        (self.requested, self.link().map_or(self.requests(), |apart| apart.ground().requests()).len())
     }
 
     /// What came to the ground so far and how power and data stand, in a mission with resources.
@@ -193,6 +138,13 @@ impl InProcessMission {
             battery_level: onboard.battery().level(),
             stored_bits: onboard.storage().stored(),
         })
+    }
+
+    /// How long orders took over the radio, in a mission with `[link]`.
+    #[must_use]
+    pub fn link_summary(&self) -> Option<LinkSummary> {
+        let ground = self.link()?.ground();
+        Some(LinkSummary::new(ground.lines(), self.model().period))
     }
 
     /// Decides and flies to the end, handing each task and its line to `each`.
@@ -228,7 +180,9 @@ impl InProcessMission {
             return Ok(None);
         }
         let decided_at = self.mission.now();
-        let (decision, delay) = match self.faults.hold(decided_at, planner) {
+        let command_lost = self.link().is_some_and(|apart| apart.space().command_lost(decided_at));
+        let held = self.faults.hold(decided_at, planner).or(command_lost.then_some(self.faults.hold));
+        let (decision, delay) = match held {
             Some(ticks) => (self.mission.decide(&mut Nobody { ticks })?, 0),
             None => (self.mission.decide(planner)?, self.mission.planning_delay()),
         };
@@ -242,7 +196,13 @@ impl InProcessMission {
     /// Flies a task, in which guidance may be lost.
     fn fly(&mut self, decision: Decision, delay: u32, until: Tick) -> Result<SettledTask, PlannerError> {
         let task = decision.to_task(&self.mission.context())?;
-        let end = self.mission.now().after(delay).after(task.ticks()).min(until);
+        let start = self.mission.now().after(delay);
+        let end = start.after(task.ticks()).min(until);
+        let lost = self.faults.guidance.front().map_or(end, |(from, _)| end.min(*from));
+        let given_up = self.listen(&task, start, lost).filter(|given_up| *given_up < lost);
+        if let Some(given_up) = given_up {
+            return self.mission.fly_after(decision, delay, given_up);
+        }
         match self.faults.guidance.pop_front_if(|(from, _)| *from <= end) {
             Some((from, back)) => {
                 let executive = self.fresh_executive();
@@ -250,6 +210,17 @@ impl InProcessMission {
                 self.mission.fly_lost(decision, delay, (from, back), executive)
             }
             None => self.mission.fly_after(decision, delay, until),
+        }
+    }
+
+    /// What the satellite hears while a task is flown that images a strip; the tick at which it gives the task up, or
+    /// `until`.
+    fn listen(&mut self, task: &Task, start: Tick, until: Tick) -> Option<Tick> {
+        let Task::Image { id, t_pre, t_acq, .. } = *task else { return None };
+        let task = self.mission.context().task;
+        match self.mission.keeper_mut() {
+            Keeper::Together(_) => None,
+            Keeper::Apart(apart) => Some(apart.fly(InFlight { task, id, start, t_pre, t_acq }, until)),
         }
     }
 
@@ -266,7 +237,9 @@ impl InProcessMission {
             reports.push(report);
         }
         reports.extend(planner);
-        report_all(&mut self.board, reports);
+        let space = self.link().map(Apart::space);
+        reports.extend(space.map(|space| of_ground(now, space.heard(), space.command_lost(now))));
+        report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
     }
 }
@@ -340,7 +313,7 @@ mod tests {
 
     use super::*;
     use crate::alarms::{Entry, Event};
-    use crate::guarded::GuardedPlanner;
+    use crate::fallback::GuardedPlanner;
 
     fn mission(faults: &[&str]) -> Mission {
         let text =

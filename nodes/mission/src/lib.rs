@@ -4,10 +4,12 @@
 
 pub mod alarms;
 pub mod approval;
+pub mod fallback;
 pub mod faults;
 pub mod file;
-pub mod guarded;
 pub mod in_process;
+mod keeper;
+pub mod link;
 pub mod orders;
 pub mod outcome;
 pub mod requests;

@@ -5,7 +5,8 @@ use swath_sim::mission::Delivered;
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::TickPeriod;
 
-use crate::guarded::Deciders;
+use crate::fallback::Deciders;
+use crate::link::response::LinkSummary;
 
 /// Most orders in a table for people.
 const ORDERS_TOLD: usize = 20;
@@ -121,6 +122,9 @@ pub struct Summary {
     /// What came to the ground and what was left, in a mission with `[resources]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resources: Option<ResourcesSummary>,
+    /// How long orders took over the radio, in a mission with `[link]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkSummary>,
 }
 
 /// A line or an area that became several strips, and how much of it is imaged.
@@ -184,6 +188,8 @@ pub struct SummaryInputs {
     pub orders: Vec<OrderOutcome>,
     /// What came to the ground and what was left.
     pub resources: Option<ResourcesSummary>,
+    /// How long orders took over the radio.
+    pub link: Option<LinkSummary>,
 }
 
 impl Summary {
@@ -216,6 +222,7 @@ impl Summary {
             nodes: inputs.nodes,
             orders: inputs.orders,
             resources: inputs.resources,
+            link: inputs.link,
         }
     }
 
@@ -249,6 +256,7 @@ impl Summary {
                 ("stored at the end", format!("{:.3} Gbit", *stored_bits as f64 / 1e9)),
             ]);
         }
+        rows.extend(self.link.iter().flat_map(LinkSummary::rows));
         let lines = rows.iter().map(|(name, value)| format!("  {name:<20} {value}\n"));
         let told = self.orders.iter().take(ORDERS_TOLD).map(|it| {
             let name: String = it.name.chars().filter(|letter| !letter.is_control()).collect();

@@ -10,8 +10,8 @@ use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
 use crate::out;
@@ -74,6 +74,9 @@ impl MissionNode {
             bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
         }
         let mission = Mission::read(&path)?;
+        if mission.link.is_some() {
+            bail!("a mission with [link] flies in one process only: swath launch {} --in-process", path.display());
+        }
         let model = Arc::new(mission.model()?);
         let keep =
             Spec::new("keep", String::new(), "Folder for what the node needs to go on when it is started again.");

@@ -18,8 +18,9 @@ const BY_INDEX: u16 = 0x08;
 
 const ADD: u16 = 0x00;
 const SUB: u16 = 0x10;
-const OR: u16 = 0x40;
-const LSH: u16 = 0x60;
+const MUL: u16 = 0x20;
+const AND: u16 = 0x50;
+const RSH: u16 = 0x70;
 
 const JA: u16 = 0x00;
 const JEQ: u16 = 0x10;
@@ -116,6 +117,11 @@ impl Program {
         self.push(ST, place);
     }
 
+    /// Loads what was stored.
+    pub(crate) fn load_kept(&mut self, place: u32) {
+        self.push(LD | MEM, place);
+    }
+
     /// Loads the index from memory.
     pub(crate) fn index(&mut self, place: u32) {
         self.push(LDX | MEM, place);
@@ -136,14 +142,22 @@ impl Program {
         self.push(ALU | SUB | BY_INDEX, 0);
     }
 
-    /// Takes the bits of the index in.
-    pub(crate) fn or_index(&mut self) {
-        self.push(ALU | OR | BY_INDEX, 0);
+    /// Turns the two lower bytes over, whatever the upper ones are.
+    pub(crate) fn turn_over(&mut self) {
+        self.push(ALU | AND, 0xffff);
+        self.push(ALU | MUL, 0x0001_0001);
+        self.push(ALU | RSH, 8);
+        self.push(ALU | AND, 0xffff);
     }
 
-    /// Shifts to the left.
-    pub(crate) fn shift_left(&mut self, bits: u32) {
-        self.push(ALU | LSH, bits);
+    /// Keeps only these bits.
+    pub(crate) fn mask(&mut self, bits: u32) {
+        self.push(ALU | AND, bits);
+    }
+
+    /// Shifts to the right.
+    pub(crate) fn shift_right(&mut self, bits: u32) {
+        self.push(ALU | RSH, bits);
     }
 
     /// Goes on elsewhere.
@@ -184,6 +198,13 @@ impl Program {
     /// The packet is dropped.
     pub(crate) fn drop_it(&mut self) {
         self.push(RET, 0);
+    }
+
+    /// Memory that the kernel takes for it [B]: a step has 8, an access to the packet becomes eight of its own.
+    #[cfg(test)]
+    pub(crate) fn kernel_bytes(&self) -> usize {
+        let accesses = self.steps.iter().filter(|step| step.code & 0xe7 == LD | IND).count();
+        8 * self.steps.len() + 56 * accesses
     }
 
     /// The program as the kernel takes it; nothing if it jumps too far or has too many instructions.

@@ -1,7 +1,7 @@
 //! The topic writers of other processes, as discovery shows them.
 
 use rustdds::policy::{Durability as DdsDurability, Reliability as DdsReliability};
-use rustdds::{DomainParticipant, RTPSEntity as _};
+use rustdds::{DomainParticipant, Duration as DdsDuration, RTPSEntity as _};
 
 use crate::qos::{Durability, QosProfile, SEND_TIMEOUT, WhenFull};
 
@@ -30,6 +30,9 @@ pub(crate) fn remote_writers(participant: &DomainParticipant) -> Vec<RemoteWrite
             }
             if !matches!(data.durability, None | Some(DdsDurability::Volatile)) {
                 qos = qos.durability(Durability::TransientLocal);
+            }
+            if let Some(lifespan) = data.lifespan.filter(|it| it.duration != DdsDuration::INFINITE) {
+                qos = qos.lifespan(Some(lifespan.duration.into()));
             }
             Some(RemoteWriter { topic: ros_topic(&data.topic_name)?, type_name: ros_type(&data.type_name)?, qos })
         })

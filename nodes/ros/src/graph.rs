@@ -11,10 +11,11 @@ use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
-    CancelStrips, Decision, DecisionPoint, GetLimits, GetStrip, GuidanceStatus, ImagingTask, ListHistory, ListStrips,
-    OperatorAction, PlannerStatus, PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips,
-    SetPlannerMode, SpacecraftState, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult,
-    UpcomingStrips, WheelTorque,
+    AcknowledgeAlarm, AlarmEvent, CancelStrips, Decision, DecisionPoint, GetLimits, GetStrip, GuidanceStatus,
+    ImagingTask, ListAlarms, ListHistory, ListStrips, OperatorAction, PlannerStatus, PreviewStrip, ReplaceStrip,
+    RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms,
+    StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips,
+    WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -151,6 +152,11 @@ pub const REQUEST_ACTIONS: Topic<OperatorAction> =
     Topic::new("requests/actions", Profile::Event, &[REQUEST_MANAGER], &[]);
 /// What was asked for of the planner and taken.
 pub const PLANNER_ACTIONS: Topic<OperatorAction> = Topic::new("planner/actions", Profile::Event, &[PLANNER], &[]);
+/// All alarms that are not normal.
+pub const STANDING_ALARMS: Topic<StandingAlarms> =
+    Topic::new("alarms/standing", Profile::Latched, &[LAUNCHER], &[OPERATOR]);
+/// What happens to alarms.
+pub const ALARM_EVENTS: Topic<AlarmEvent> = Topic::new("alarms/events", Profile::Event, &[LAUNCHER], &[OPERATOR]);
 /// How many strip requests are in which state.
 pub const REQUEST_SUMMARY: Topic<RequestSummary> =
     Topic::new("requests/summary", Profile::Latched, &[REQUEST_MANAGER], &[LAUNCHER, OPERATOR]);
@@ -191,6 +197,14 @@ pub const GET_LIMITS: Service<GetLimits> = Service::new("requests/limits", &[REQ
 pub const SET_PLANNER_MODE: Service<SetPlannerMode> = Service::new("planner/set_mode", &[PLANNER], &[OPERATOR]);
 /// Approves or rejects what the planner proposes.
 pub const REVIEW_PROPOSAL: Service<ReviewProposal> = Service::new("planner/review", &[PLANNER], &[OPERATOR]);
+/// An operator knows of an alarm.
+pub const ACKNOWLEDGE_ALARM: Service<AcknowledgeAlarm> = Service::new("alarms/acknowledge", &[LAUNCHER], &[OPERATOR]);
+/// An operator does not want to be told of an alarm for a while.
+pub const SHELVE_ALARM: Service<ShelveAlarm> = Service::new("alarms/shelve", &[LAUNCHER], &[OPERATOR]);
+/// An operator wants to be told of an alarm again.
+pub const UNSHELVE_ALARM: Service<UnshelveAlarm> = Service::new("alarms/unshelve", &[LAUNCHER], &[OPERATOR]);
+/// All alarms that are not normal.
+pub const LIST_ALARMS: Service<ListAlarms> = Service::new("alarms/list", &[LAUNCHER], &[OPERATOR]);
 
 /// Every topic of the table; the recorder records these.
 pub const TOPICS: &[Entry] = &[
@@ -215,6 +229,8 @@ pub const TOPICS: &[Entry] = &[
     PLANNER_DECISION.entry,
     PLANNER_STATUS.entry,
     PLANNER_ACTIONS.entry,
+    STANDING_ALARMS.entry,
+    ALARM_EVENTS.entry,
     DIAGNOSTICS.entry,
     ROSOUT.entry,
     PARAMETER_EVENTS.entry,
@@ -233,6 +249,10 @@ pub const SERVICES: &[Entry] = &[
     GET_LIMITS.entry,
     SET_PLANNER_MODE.entry,
     REVIEW_PROPOSAL.entry,
+    ACKNOWLEDGE_ALARM.entry,
+    SHELVE_ALARM.entry,
+    UNSHELVE_ALARM.entry,
+    LIST_ALARMS.entry,
 ];
 
 /// The table as a Mermaid flow chart: nodes are boxes, topics are arrows between them.
@@ -336,6 +356,8 @@ mod tests {
     planner -->|planner/task| request_manager
     planner -->|planner/decision| launcher
     planner -->|planner/status| operator
+    launcher -->|alarms/standing| operator
+    launcher -->|alarms/events| operator
     operator <-.->|requests/submit| request_manager
     operator <-.->|requests/cancel| request_manager
     operator <-.->|requests/replace| request_manager
@@ -347,6 +369,10 @@ mod tests {
     operator <-.->|requests/limits| request_manager
     operator <-.->|planner/set_mode| planner
     operator <-.->|planner/review| planner
+    operator <-.->|alarms/acknowledge| launcher
+    operator <-.->|alarms/shelve| launcher
+    operator <-.->|alarms/unshelve| launcher
+    operator <-.->|alarms/list| launcher
     FLIGHT([every topic]) --> recorder
 ";
         assert_eq!(mermaid(), expected);

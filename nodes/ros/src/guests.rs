@@ -58,6 +58,12 @@ impl Guests {
         })
     }
 
+    /// The readers of this process, and their topics in DDS.
+    pub(crate) fn readers_of<'a>(&'a self, process: &'a [u8]) -> impl Iterator<Item = (Gid, &'a str)> {
+        let own = self.readers.iter().filter(move |(gid, _)| gid.as_bytes().starts_with(process));
+        own.map(|(gid, reader)| (*gid, reader.described.topic.as_str()))
+    }
+
     pub(crate) fn lose(&mut self, gid: Gid) {
         self.readers.remove(&gid);
     }

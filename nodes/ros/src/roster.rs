@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use ros2_client::Gid;
-use rustdds::{DomainParticipantStatusEvent, EndpointDescription, Timestamp};
+use rustdds::{DomainParticipantStatusEvent, EndpointDescription, LostReason, Timestamp};
 use swath_msgs::rmw_dds_common::{self, NodeEntitiesInfo, ParticipantEntitiesInfo};
 
 use crate::cdr::Cdr;
@@ -244,7 +244,12 @@ impl Roster {
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
                 state.lose(guid.into());
             }
-            Event::ParticipantLost { id, .. } => state.lose_participant(id.as_ref()),
+            Event::ParticipantLost { id, reason } => {
+                if matches!(reason, LostReason::Timeout { .. }) {
+                    self.note_silence(&state, id.as_ref());
+                }
+                state.lose_participant(id.as_ref());
+            }
             Event::RemoteReaderQosIncompatible { remote_reader, .. } => {
                 state.refuse(remote_reader.into(), "a reader");
             }
@@ -255,6 +260,18 @@ impl Roster {
         }
         drop(state);
         self.note_change();
+    }
+
+    /// A process has not been heard for so long that its readers are served no longer. Those of members are missed by
+    /// others.
+    fn note_silence(&self, state: &State, process: &[u8]) {
+        let served = state.guests.readers_of(process).find(|(gid, _)| state.is_matched(*gid));
+        let Some((gid, topic)) = served.filter(|_| self.member) else { return };
+        if state.members.name_of(prefix_of(gid)).is_none() {
+            let of = state.node_of(&gid).unwrap_or_else(|| "an unknown process".to_owned());
+            let text = || format!("{of} is silent, and served no longer");
+            self.notices.note(Trouble::Lagging, topic.strip_prefix("rt").unwrap_or(topic), text);
+        }
     }
 
     fn note_change(&self) {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use anyhow::{Error, Result};
 use clap::{Parser, Subcommand};
 use swath_ground::debrief::{export, refly, report};
-use swath_ground::{launch, operate};
+use swath_ground::{launch, operate, passes};
 use swath_node::out;
 use swath_nodes::POLICIES;
 use swath_ros::RosArgs;
@@ -26,6 +26,10 @@ enum Command {
     Strips(operate::StripsArgs),
     /// Say what the planner may do by itself, and decide on what it proposes.
     Planner(operate::PlannerArgs),
+    /// Say what is wrong, and what operators know of it.
+    Alarms(operate::AlarmsArgs),
+    /// Say when stations see the satellite of a mission, from its file alone.
+    Passes(passes::PassesArgs),
     /// Show a flying or a recorded mission as a page in a browser.
     Console(swath_console::ConsoleArgs),
     /// Show a flying or a recorded mission in Foxglove.
@@ -53,6 +57,8 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Launch(args) => return launch::run(&args, ros, &POLICIES),
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
+        Command::Alarms(args) => operate::run_alarms(&args, ros)?,
+        Command::Passes(args) => passes::run(&args)?,
         Command::Console(args) => swath_console::run(&args, ros)?,
         Command::Bridge(args) => swath_bridge::run(&args, ros)?,
         Command::Refly(args) => return args.run(&POLICIES),

@@ -1,5 +1,7 @@
 //! Bad input: each a clear error, an exit code, and no mission harmed.
 
+use swath_sim::error::StripError;
+
 use crate::common;
 
 #[test]
@@ -39,6 +41,13 @@ fn faulty_requests_are_refused_with_their_place() {
     large.set_len(200_000_000).unwrap();
     let error = common::fail(common::command("swath", "0").args(["strips", "submit"]).arg(&file));
     assert!(error.contains("has more than the limit of 100 MB"), "{error}");
+}
+
+/// A line that is a point has a length by the errors of rounding; nobody needs to read that.
+#[test]
+fn lengths_are_told_to_the_metre() {
+    let error = StripError::Length { length_km: 5.523186016267257e-13, min_km: 20.0, max_km: 500.0 };
+    assert_eq!(error.to_string(), "length 0.000 km is outside 20 to 500 km");
 }
 
 #[test]

@@ -241,6 +241,8 @@ fn exports_are_read_by_others() {
     assert_eq!(read["completed"].as_u64().unwrap(), imaged);
     assert!(read["largest_track_difference_deg"].as_f64().unwrap() < 1e-6, "{read}");
     assert!(read["largest_attitude_difference"].as_f64().unwrap() < 1e-9, "{read}");
+    let ccsds = |key: &str| read["ccsds"][key].as_f64().unwrap();
+    assert!(ccsds("place_m") < 2e-3 && ccsds("speed_km_s") < 1e-4 && ccsds("turn") < 1e-11, "{read}");
 
     let only = folder.path().join("only");
     common::succeed(&mut swath(&["export", text(&sample()), "-o", text(&only), "--format", "czml"]));

@@ -151,6 +151,22 @@ fn a_missing_policy_is_told_by_summary_and_exit_code() {
 }
 
 #[test]
+fn a_policy_on_another_satellite_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "orbits = 0.1\nplanner = \"hop-ppo\"\n[sim.spacecraft]\nwheel_torque_max_nm = 0.25\n";
+    let mission = common::write_mission(folder.path(), text);
+    for (out, words) in [("in_process", &["--in-process"][..]), ("over_dds", &["--no-bag"])] {
+        let mut launch = common::swath(&common::domain(), &["launch", mission.to_str().unwrap()]);
+        let output = common::run(launch.args(words).arg("--out").arg(folder.path().join(out)));
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{stderr}");
+        let told =
+            "hop-ppo was trained on another satellite: spacecraft.wheel_torque_max_nm was 0.3 there and is 0.25 here";
+        assert_eq!(stderr.matches(told).count(), 1, "{stderr}");
+    }
+}
+
+#[test]
 fn errors_are_told_once_and_without_colours() {
     for node in NODES {
         let mut command = common::command(node, &common::domain());
@@ -164,6 +180,20 @@ fn errors_are_told_once_and_without_colours() {
         let words = ["launch", mission.to_str().unwrap(), "--in-process", "--pace", pace];
         let error = common::fail(common::swath("0", &words).current_dir(folder.path()));
         assert!(error.contains(told), "{error}");
+    }
+}
+
+#[test]
+fn help_names_every_planner() {
+    let help = common::succeed(&mut common::swath("0", &["launch", "--help"]));
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    for name in
+        ["random", "heuristic:SECONDS", "lookahead:TICKS", "beam:WIDTHxDEPTH", "repair:TICKS", "aspen", "-squeaky"]
+    {
+        assert!(help.contains(name), "{name} is not in {help}");
+    }
+    for name in ["hop-ppo", "hop-ppo-mlp", "h-ppo", "discrete-ppo", "+lookahead", ":FILE"] {
+        assert!(help.contains(name), "{name} is not in {help}");
     }
 }
 

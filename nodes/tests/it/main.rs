@@ -1,13 +1,19 @@
 //! Tests of the programs of this suite, from outside: processes, topics, files.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
+mod alarms;
 mod bad_input;
 mod bag;
 mod bridge;
+mod citizens;
 mod clients;
 mod common;
 mod console;
+mod datagrams;
 mod examples;
+#[path = "../../examples/common/flight.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod flight;
 mod habits;
 mod killed;
 mod operators_day;
@@ -16,5 +22,9 @@ mod peer;
 mod pins;
 mod readme;
 mod recorded;
+mod storm;
+#[path = "../../ros/tests/it/stranger.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod stranger;
 mod supervised;
 mod two_satellites;

@@ -1,5 +1,5 @@
 //! An outside ROS 2 peer (CycloneDDS) receives states and status, submits strips that are then imaged, previews one and
-//! cancels one.
+//! cancels one, and acknowledges an alarm.
 
 use crate::common;
 
@@ -7,7 +7,10 @@ use crate::common;
 fn a_cyclonedds_peer_sees_the_mission_and_has_a_strip_imaged() {
     let folder = tempfile::tempdir().unwrap();
     // Twelve orbits at 200 times real time, if the peer does not end it before.
-    let mission = common::write_mission(folder.path(), "orbits = 12.0\npace = 200.0\nseed = 5\n");
+    let mission = common::write_mission(
+        folder.path(),
+        "orbits = 12.0\npace = 200.0\nseed = 5\n[faults]\nplan = [\"wheel2:weak 60%@60s\"]\n",
+    );
     let domain = common::domain();
     let mut launch = common::command("swath", &domain);
     launch.arg("launch").arg(mission).arg("--no-bag").arg("--out").arg(folder.path().join("out"));
@@ -23,6 +26,9 @@ fn a_cyclonedds_peer_sees_the_mission_and_has_a_strip_imaged() {
     }
     assert_eq!(seen["no_opportunity"], 110, "{seen}");
     assert_eq!(seen["cancelled"], serde_json::json!([[true, 0], [false, 120]]), "{seen}");
+    assert_eq!(seen["alarm"], serde_json::json!(["guidance", 2, 1, 1]), "{seen}");
+    assert_eq!(seen["unknown_alarm"], serde_json::json!([false, "there is no alarm `wheel q` of guidance"]), "{seen}");
+    assert_eq!(seen["acknowledged"], serde_json::json!([true, 2]), "{seen}");
     assert!(seen["imaged"].as_str().unwrap().starts_with("peer-"), "{seen}");
     assert_eq!(seen["imaged_reward"], 0.9, "{seen}");
     launch.stop();

@@ -39,6 +39,9 @@ fn two_satellites_fly_side_by_side_as_if_each_were_alone() {
             json_lines(&succeed(cat.arg("cat").arg(&bag).args(["--topic", topic])))
         };
         assert!(cat(&format!("/{name}/clock")).len() > 1000);
+        let other = if name == "sat1" { "/sat2/" } else { "/sat1/" };
+        let info = succeed(common::command("swath-bag", "0").arg("info").arg(&bag));
+        assert!(info.contains(&format!("/{name}/spacecraft/state")) && !info.contains(other), "{info}");
         let shared = common::fail(common::command("swath-bag", "0").arg("cat").arg(&bag).args(["--topic", "/clock"]));
         assert!(shared.contains("the bag has no topic /clock"), "{shared}");
         let frame = |message: &Value| message["message"]["transforms"][0]["child_frame_id"].clone();

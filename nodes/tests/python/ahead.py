@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 import urllib.request
 
 EARTH_RAD_S = 7.292115e-5
@@ -18,6 +19,16 @@ def log(base, after=0):
         facts += page
 
 
+def points(base):
+    """The last two points under the satellite; waits for them."""
+    for _ in range(120):
+        found = [fact for fact in log(base) if fact["kind"] == "point"]
+        if len(found) >= 2:
+            return found[-2:]
+        time.sleep(0.5)
+    raise AssertionError("the satellite does not tell where it is")
+
+
 def turned(fact):
     """The direction of a point in a frame that does not turn with the Earth."""
     lon = math.radians(fact["lon"]) + EARTH_RAD_S * fact["t"] / 1000
@@ -27,7 +38,7 @@ def turned(fact):
 
 def place(base, seconds):
     """Longitude and latitude [deg] under the satellite, so many seconds of simulated time after its last point."""
-    before, last = [fact for fact in log(base) if fact["kind"] == "point"][-2:]
+    before, last = points(base)
     a, b = turned(before), turned(last)
     angle = math.acos(sum(x * y for x, y in zip(a, b)))
     rate = angle / ((last["t"] - before["t"]) / 1000)

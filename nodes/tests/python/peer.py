@@ -1,4 +1,5 @@
-"""An outside ROS 2 peer over CycloneDDS: receives states, submits strips, and sees one of them imaged.
+"""An outside ROS 2 peer over CycloneDDS: receives states, submits strips, sees one of them imaged, and acknowledges an
+alarm.
 
 Prints one JSON object; exits with 1 when something does not come in time.
 """
@@ -209,13 +210,63 @@ class PreviewResponse(IdlStruct, typename="swath_msgs::srv::dds_::PreviewStrip_R
     reason: str
 
 
+@dataclass
+@ann.final
+class Alarm(IdlStruct, typename="swath_msgs::msg::dds_::Alarm_"):
+    node: str
+    name: str
+    severity: uint8
+    state: uint8
+    beneath: uint8
+    text: str
+    sequence: uint64
+    raised_tick: uint64
+    raised: Time
+    shelved_until_tick: uint64
+    shelved_until: Time
+
+
+@dataclass
+@ann.final
+class StandingAlarms(IdlStruct, typename="swath_msgs::msg::dds_::StandingAlarms_"):
+    header: Header
+    tick: uint64
+    alarms: sequence[Alarm]
+
+
+@dataclass
+@ann.final
+class AcknowledgeRequest(IdlStruct, typename="swath_msgs::srv::dds_::AcknowledgeAlarm_Request_"):
+    client: uint64
+    number: int64
+    node: str
+    name: str
+    actor: str
+    comment: str
+
+
+@dataclass
+@ann.final
+class AcknowledgeResponse(IdlStruct, typename="swath_msgs::srv::dds_::AcknowledgeAlarm_Response_"):
+    client: uint64
+    number: int64
+    accepted: bool
+    reason: str
+
+
 class Peer:
     def __init__(self, domain):
         participant = DomainParticipant(domain)
         reliable = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(1000))
 
-        def reader(name, kind):
-            return DataReader(participant, Topic(participant, name, kind), reliable)
+        latched = Qos(
+            Policy.Reliability.Reliable(duration(seconds=1)),
+            Policy.Durability.TransientLocal,
+            Policy.History.KeepLast(1),
+        )
+
+        def reader(name, kind, qos=reliable):
+            return DataReader(participant, Topic(participant, name, kind), qos)
 
         def writer(name, kind):
             return DataWriter(participant, Topic(participant, name, kind), reliable)
@@ -223,12 +274,14 @@ class Peer:
         self.states = reader("rt/swath/spacecraft/state", SpacecraftState)
         self.events = reader("rt/swath/requests/events", StripStatus)
         self.plain = writer("rt/swath/requests/request", StripRequest)
+        self.alarms = reader("rt/swath/alarms/standing", StandingAlarms, latched)
         self.services = {
-            name: (writer(f"rq/swath/requests/{name}Request", request), reader(f"rr/swath/requests/{name}Reply", response))
+            name: (writer(f"rq/swath/{name}Request", request), reader(f"rr/swath/{name}Reply", response))
             for name, request, response in [
-                ("submit", SubmitRequest, SubmitResponse),
-                ("cancel", CancelRequest, CancelResponse),
-                ("preview", PreviewRequest, PreviewResponse),
+                ("requests/submit", SubmitRequest, SubmitResponse),
+                ("requests/cancel", CancelRequest, CancelResponse),
+                ("requests/preview", PreviewRequest, PreviewResponse),
+                ("alarms/acknowledge", AcknowledgeRequest, AcknowledgeResponse),
             ]
         }
         self.number = 0
@@ -254,17 +307,29 @@ class Peer:
                     if response.client == 77:
                         return response
                 time.sleep(0.01)
-        sys.exit(f"nobody answers requests/{name}")
+        sys.exit(f"nobody answers {name}")
 
     def submit(self, strips):
-        return self.call("submit", lambda client, number: SubmitRequest(client, number, strips)).results
+        return self.call("requests/submit", lambda client, number: SubmitRequest(client, number, strips)).results
 
     def cancel(self, ids):
         make = lambda client, number: CancelRequest(client, number, ids, "peer", "changed my mind")
-        return self.call("cancel", make).results
+        return self.call("requests/cancel", make).results
 
     def preview(self, strip, horizon_s):
-        return self.call("preview", lambda client, number: PreviewRequest(client, number, 0, strip, horizon_s))
+        return self.call("requests/preview", lambda client, number: PreviewRequest(client, number, 0, strip, horizon_s))
+
+    def acknowledge(self, node, name):
+        make = lambda client, number: AcknowledgeRequest(client, number, node, name, "peer", "seen")
+        return self.call("alarms/acknowledge", make)
+
+    def alarm(self, name):
+        """An alarm as it stands, told whenever one of them changes."""
+        for standing in self.alarms.take(10):
+            for alarm in standing.alarms:
+                if alarm.name == name:
+                    return alarm
+        return None
 
 
 def request(reference, latitude, longitude):
@@ -286,6 +351,10 @@ def main():
     # The strip that comes last has the most time to be taken back.
     last = peer.submit([request("peer-cancel", 7.0, 33.0)])[0].id
     cancelled = peer.cancel([last, 123456])
+    alarm = peer.wait("an alarm", lambda: peer.alarm("wheel y"))
+    unknown = peer.acknowledge("guidance", "wheel q")
+    known = peer.acknowledge("guidance", "wheel y")
+    acknowledged = peer.wait("it acknowledged", lambda: peer.alarm("wheel y"))
     ids = {result.id for result in results if result.accepted}
     seen = set()
 
@@ -307,6 +376,9 @@ def main():
         "elevations": [opportunity.min_elevation for opportunity in preview.opportunities],
         "no_opportunity": no_preview.reason_code,
         "cancelled": [(result.accepted, result.reason_code) for result in cancelled],
+        "alarm": [alarm.node, alarm.severity, alarm.state, alarm.sequence],
+        "unknown_alarm": [unknown.accepted, unknown.reason],
+        "acknowledged": [known.accepted, acknowledged.state],
         "imaged": event.client_ref,
         "imaged_reward": event.reward,
     }))

@@ -6,6 +6,7 @@ import pathlib
 import sys
 
 import duckdb
+import oem
 
 folder = pathlib.Path(sys.argv[1])
 
@@ -65,6 +66,32 @@ def attitude_difference(i):
     return max(*(abs(a - b) for a, b in zip(inertial, fixed)), abs(r[2] - positions[4 * i + 3]) / 7e6)
 
 
+def of_ccsds():
+    """Largest differences of the OEM from positions and from their change, and of the AEM from the attitudes."""
+    (segment,) = oem.OrbitEphemerisMessage.open(folder / "orbit.oem").segments
+    states = list(segment)
+    assert segment.metadata["REF_FRAME"] == "ITRF2000" and segment.metadata["TIME_SYSTEM"] == "UTC"
+    place = max(
+        abs(value * 1000 - positions[4 * i + 1 + axis])
+        for i, state in enumerate(states)
+        for axis, value in enumerate(state.position)
+    )
+    # The velocity between two points ten seconds apart is about the mean of theirs.
+    speed = max(
+        abs((b.position[axis] - a.position[axis]) / 10 - (a.velocity[axis] + b.velocity[axis]) / 2)
+        for a, b in zip(states[:-2], states[1:-1])
+        for axis in range(3)
+    )
+    lines = (folder / "attitude.aem").read_text().split("DATA_START\n")[1].split("\nDATA_STOP")[0].splitlines()
+    turn = max(
+        abs(float(value) - quaternions[5 * i + 1 + axis])
+        for i, line in enumerate(lines)
+        for axis, value in enumerate(line.split()[1:])
+    )
+    assert len(states) == len(lines) == len(track)
+    return {"place_m": place, "speed_km_s": speed, "turn": turn}
+
+
 count = len(positions) // 4
 assert count == len(quaternions) // 5 == len(track)
 strips = json.loads((folder / "strips.geojson").read_text())["features"]
@@ -80,4 +107,5 @@ print(json.dumps({
     "completed": sum(strip["properties"]["state"] == "completed" for strip in strips),
     "largest_track_difference_deg": max(map(track_difference, range(count))),
     "largest_attitude_difference": max(map(attitude_difference, range(count))),
+    "ccsds": of_ccsds(),
 }))

@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::passes::Passes;
 use super::plan::{Plan, PlannedTask};
 use crate::learn::episode::Env;
-use crate::model::Model;
 use crate::planner::{Allowance, Search};
 use crate::requests::catalogue::Candidate;
 use crate::vehicle::flight::Situation;
+use crate::vehicle::model::Model;
 use crate::vehicle::mrp;
 use crate::world::frames::reference_dcm;
 use crate::world::orbit::Orbit;
@@ -55,7 +55,7 @@ const PRIOR_RATE: f64 = 0.5 / 200.0;
 /// use swath_sim::config::SimConfig;
 /// use swath_sim::foresight::{CANDIDATES, GroundSettings, plan, upper_bound};
 /// use swath_sim::learn::episode::{Env, EpisodeConfig};
-/// use swath_sim::model::Model;
+/// use swath_sim::vehicle::model::Model;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut config = SimConfig::default();

@@ -9,7 +9,6 @@ use crate::config::resources::RewardKind;
 use crate::error::{SimError, StripError};
 use crate::learn::observation::{ObservationSet, observe};
 use crate::mission::{Mission, RequestKeeper, horizon, windows_until};
-use crate::model::Model;
 use crate::planner::{Decision, PlannerError};
 use crate::requests::catalogue::{Candidate, Catalogue};
 use crate::requests::scenario::ScenarioConfig;
@@ -21,6 +20,7 @@ use crate::vehicle::faults::TimedFault;
 use crate::vehicle::flight::{Flight, Situation};
 use crate::vehicle::health::Health;
 use crate::vehicle::initial::InitialState;
+use crate::vehicle::model::Model;
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::strip::{StripId, StripRequest};
 

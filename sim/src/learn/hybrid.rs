@@ -9,9 +9,9 @@ use thiserror::Error;
 use crate::learn::episode::{Env, EpisodeConfig};
 use crate::learn::observation::ObservationSet;
 use crate::mission::horizon;
-use crate::model::Model;
 use crate::planner::{Decision, Planner, PlannerError};
 use crate::task::FailureReason;
+use crate::vehicle::model::Model;
 
 /// How long to wait when no strip is left to choose from [s].
 const WAIT_S: f64 = 60.0;
@@ -128,7 +128,7 @@ pub fn wait(model: &Model) -> Decision {
 /// use swath_sim::learn::episode::EpisodeConfig;
 /// use swath_sim::learn::hybrid::{Action, Episode};
 /// use swath_sim::learn::observation::ObservationSet;
-/// use swath_sim::model::Model;
+/// use swath_sim::vehicle::model::Model;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let model = Arc::new(Model::new(Default::default())?);

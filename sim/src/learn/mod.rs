@@ -3,4 +3,4 @@
 pub mod episode;
 pub mod hybrid;
 pub mod observation;
-pub mod score;
+pub mod statistics;

@@ -2,11 +2,11 @@
 
 use thiserror::Error;
 
-use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::task::{Duty, Task, TaskRecord};
 use crate::vehicle::flight::Situation;
 use crate::vehicle::health::lost;
+use crate::vehicle::model::Model;
 
 /// Everything that a decision rests on.
 #[derive(Clone, Copy, Debug)]

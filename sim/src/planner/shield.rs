@@ -1,8 +1,8 @@
 //! A shield around any planner: it never lets the battery below its floor, and sees to momentum and downlink.
 
 use super::{Decision, DecisionContext};
-use crate::model::Model;
 use crate::task::Duty;
+use crate::vehicle::model::Model;
 use crate::world::sun::Sun;
 
 /// What a decision may cost, and what is done instead of one that costs too much.

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 
 use super::lookahead::{Allowance, Search};
-use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::flight::Situation;
+use crate::vehicle::model::Model;
 use crate::vehicle::mrp;
 use crate::world::frames::reference_dcm;
 use crate::world::orbit::Orbit;

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::error::StripError;
-use crate::model::Model;
 use crate::time::Tick;
+use crate::vehicle::model::Model;
 use crate::world::orbit::Orbit;
 use crate::world::strip::{Strip, StripId, StripRequest};
 use crate::world::windows::{Window, WindowFinder};

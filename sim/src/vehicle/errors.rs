@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{SimConfig, in_range};
 use crate::error::SimError;
-use crate::model::Model;
 use crate::rng::Rng;
 use crate::vehicle::dynamics::{BodyState, Plant};
+use crate::vehicle::model::Model;
 use crate::vehicle::mrp;
 
 /// Errors of the flown plant; without any by default.

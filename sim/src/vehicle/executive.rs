@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use crate::model::Model;
 use crate::task::{Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::guidance::{Guidance, GuidanceTick};
 use crate::vehicle::health::{Health, Watch};
+use crate::vehicle::model::Model;
 
 /// The satellite at a tick, as the executive is told of it.
 #[derive(Clone, Copy, Debug)]

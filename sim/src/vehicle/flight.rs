@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use crate::model::Model;
 use crate::task::{Duty, Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
@@ -10,6 +9,7 @@ use crate::vehicle::executive::{Executive, Sight};
 use crate::vehicle::guidance::GuidanceTick;
 use crate::vehicle::health;
 use crate::vehicle::health::Health;
+use crate::vehicle::model::Model;
 use crate::vehicle::resources::{Activity, Imager, ResourceState};
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;

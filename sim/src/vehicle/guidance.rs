@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use crate::model::Model;
 use crate::task::{Duty, FailureReason, Task, TaskOutcome};
 use crate::time::Tick;
 use crate::vehicle::control::{ControlLaw, TrackingError};
 use crate::vehicle::dynamics::{BodyState, Plant};
+use crate::vehicle::model::Model;
 use crate::vehicle::mrp;
 use crate::vehicle::mrp::EulerParameters;
 use crate::world::frames::{reference_dcm, sin_elevation};

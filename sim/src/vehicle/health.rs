@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::model::Model;
 use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
+use crate::vehicle::model::Model;
 use crate::vehicle::mrp;
 
 /// Share of the commanded torque below which a wheel falls short.

@@ -10,6 +10,7 @@ pub mod flight;
 pub mod guidance;
 pub mod health;
 pub mod initial;
+pub mod model;
 pub mod mrp;
 pub mod resources;
 pub mod spacecraft;

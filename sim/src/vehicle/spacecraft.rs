@@ -3,13 +3,13 @@
 use nalgebra::Vector3;
 
 use crate::error::SimError;
-use crate::model::Model;
 use crate::rng;
 use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
 use crate::vehicle::errors::{PlantErrors, Sensor};
 use crate::vehicle::faults::{Faults, TimedFault};
 use crate::vehicle::initial::InitialState;
+use crate::vehicle::model::Model;
 use crate::vehicle::resources::{Activity, Onboard};
 use crate::world::orbit::Orbit;
 

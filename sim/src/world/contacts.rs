@@ -72,6 +72,8 @@ pub fn contacts_of(
 pub struct Contacts {
     /// All contacts by their rise.
     all: Vec<Contact>,
+    /// Length of the longest [ticks].
+    longest: u64,
     /// Times at which any station hears the satellite, disjoint and in order: rise and set.
     any: Vec<(Tick, Tick)>,
 }
@@ -90,7 +92,8 @@ impl Contacts {
                 _ => any.push((contact.rise, contact.set)),
             }
         }
-        Self { all, any }
+        let longest = all.iter().map(Contact::ticks).max().unwrap_or(0);
+        Self { all, longest, any }
     }
 
     /// All contacts, by their rise.
@@ -101,8 +104,10 @@ impl Contacts {
 
     /// Contacts under way at a tick.
     pub fn at(&self, tick: Tick) -> impl Iterator<Item = &Contact> {
+        let over = self.all.partition_point(|contact| contact.rise.0.saturating_add(self.longest) <= tick.0);
         let risen = self.all.partition_point(|contact| contact.rise <= tick);
-        self.all.iter().take(risen).filter(move |contact| contact.contains(tick))
+        let recent = self.all.get(over..risen).unwrap_or_default();
+        recent.iter().filter(move |contact| contact.contains(tick))
     }
 
     /// The time in contact with any station that is under way at a tick or comes next: its rise and set.
@@ -205,7 +210,7 @@ mod tests {
 
     use super::*;
     use crate::config::station::names;
-    use crate::model::Model;
+    use crate::vehicle::model::Model;
     use crate::world::orbit::OrbitPhase;
 
     /// Contacts by looking at every tick: slow, and independent of the roots.

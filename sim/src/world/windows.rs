@@ -263,9 +263,9 @@ impl WindowFinder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Model;
     use crate::requests::scenario::ScenarioConfig;
     use crate::rng;
+    use crate::vehicle::model::Model;
     use crate::world::frames::{earth_to_inertial, sin_elevation};
     use crate::world::orbit::OrbitPhase;
 

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use swath_sim::config::SimConfig;
 use swath_sim::foresight::{CANDIDATES, GroundSettings, OpenLoop, Plan, plan, upper_bound};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::{Beam, Planner};
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::task::{TaskRecord, Totals};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripRequest;
 
 const SMALL: GroundSettings = GroundSettings { width: 2, branches: 5, weakness: 0.0 };

@@ -9,7 +9,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::EpisodeConfig;
 use swath_sim::learn::hybrid::{Action, Episode, Progress};
 use swath_sim::learn::observation::ObservationSet;
-use swath_sim::model::Model;
+use swath_sim::vehicle::model::Model;
 
 /// An episode and what came of it. The digest is FNV-1a over 32-bit words: features, action mask, reward and duration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

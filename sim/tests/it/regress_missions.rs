@@ -5,9 +5,9 @@ use std::sync::Arc;
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
-use swath_sim::model::Model;
 use swath_sim::planner::{Beam, BeamSearch, Decision, Heuristic, Lookahead, Planner, Random};
 use swath_sim::task::{SettledTask, Totals};
+use swath_sim::vehicle::model::Model;
 
 fn fly(planner: &mut dyn Planner, seed: u64) -> Vec<SettledTask> {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::{Beam, Experience, Heuristic, Lookahead, Planner};
 use swath_sim::task::{SettledTask, Totals};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::errors::PlantErrors;
+use swath_sim::vehicle::model::Model;
 
 fn env(episode: &EpisodeConfig, seed: u64) -> Env {
     Env::episode(Arc::new(Model::new(SimConfig::default()).unwrap()), episode, seed)

@@ -6,7 +6,6 @@ use nalgebra::Vector3;
 use swath_sim::config::SimConfig;
 use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, Heuristic, Planner, PlannerError};
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
@@ -14,6 +13,7 @@ use swath_sim::task::{Duty, Task};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::resources::Failure;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::Heuristic;
 use swath_sim::task::Totals;
+use swath_sim::vehicle::model::Model;
 
 const MISSIONS: u64 = 60;
 

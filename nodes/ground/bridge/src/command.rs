@@ -13,7 +13,8 @@ use foxglove::{Context, WebSocketServer, WebSocketServerHandle};
 use swath_bags::{Bag, TopicPattern};
 use swath_ros::{RosArgs, graph};
 
-use crate::channels::{Channels, Kept};
+use crate::channels::Channels;
+use crate::latched::Kept;
 use crate::listener::Listener;
 use crate::{live, playback};
 

@@ -8,7 +8,7 @@ use foxglove::websocket::{
     ServerListener,
 };
 
-use crate::channels::Kept;
+use crate::latched::Kept;
 
 /// What a client wishes.
 pub enum Wish {

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use swath_mission::requests::lifecycle::State;
 use swath_msgs::swath_msgs::StripStatus;
 
-use crate::channels::{Kept, send_latched};
+use crate::latched::{Kept, send_latched};
 
 /// A strip as a map draws it.
 struct Drawn {

@@ -3,7 +3,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use swath_msgs::swath_msgs as msg;
 use swath_node::orders::request_of_strip;
-use swath_sim::model::Model;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::mrp;
 use swath_sim::world::frames::latitude_longitude_deg;
 use swath_sim::world::turn::Turn;
@@ -41,8 +41,18 @@ pub fn sub_satellite(earth: &mut Turn, state: &StateSample) -> Place {
 /// The satellite's position in the planet-fixed frame [m].
 #[must_use]
 pub fn position_E(earth: &mut Turn, state: &StateSample) -> Vector3<f64> {
-    let ((cos, sin), r) = (earth.cos_sin(state.tick), state.r_BN_N);
-    Vector3::new(cos * r.x + sin * r.y, cos * r.y - sin * r.x, r.z)
+    to_E(earth.cos_sin(state.tick), &state.r_BN_N)
+}
+
+/// The satellite's velocity as seen from the planet [m/s], which turns by so much [rad/s]: v - ω×r.
+#[must_use]
+pub fn velocity_E(earth: &mut Turn, rotation_rad_s: f64, state: &StateSample) -> Vector3<f64> {
+    let turning = Vector3::new(0.0, 0.0, rotation_rad_s).cross(&state.r_BN_N);
+    to_E(earth.cos_sin(state.tick), &(state.v_BN_N - turning))
+}
+
+fn to_E((cos, sin): (f64, f64), v_N: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(cos * v_N.x + sin * v_N.y, cos * v_N.y - sin * v_N.x, v_N.z)
 }
 
 /// The rotation that takes body components to planet-fixed ones.

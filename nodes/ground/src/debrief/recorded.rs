@@ -11,11 +11,11 @@ use swath_bags::schema::{Schema, adapt};
 use swath_bags::{Bag, Filter, TopicPattern};
 use swath_msgs::RosMessage;
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::task_record;
+use swath_node::messages::task_result::task_record;
 use swath_ros::{Cdr, decode, graph};
-use swath_sim::model::Model;
 use swath_sim::task::SettledTask;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
 use swath_mission::file::{Mission, MissionRequests};

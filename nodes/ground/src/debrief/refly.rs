@@ -15,7 +15,7 @@ use swath_sim::time::Tick;
 
 use super::recorded::{Recorded, RecordedArgs};
 use swath_mission::approval::{Gate, GatedPlanner};
-use swath_mission::guarded::{GuardedPlanner, Policies};
+use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::action::{Act, Action};
 use swath_mission::outcome::TaskLine;

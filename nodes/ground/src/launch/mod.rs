@@ -20,8 +20,8 @@ use output::{Flown, OutputFolder};
 use over_dds::Wishes;
 use progress::Progress;
 use swath_mission::approval::{Gate, GatedPlanner};
+use swath_mission::fallback::{GuardedPlanner, Policies, made_instead};
 use swath_mission::file::Mission;
-use swath_mission::guarded::{GuardedPlanner, Policies, made_instead};
 use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, SummaryInputs};
@@ -55,7 +55,9 @@ pub struct LaunchArgs {
     /// Number of random strips instead of the mission's.
     #[arg(long)]
     pub requests: Option<u32>,
-    /// Planner instead of the mission's.
+    /// Planner instead of the mission's: random, heuristic:SECONDS, lookahead, lookahead:TICKS, beam, beam:WIDTHxDEPTH,
+    /// repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
+    /// or discrete-ppo, each also with +lookahead, and with :FILE for one that is not shipped.
     #[arg(long)]
     pub planner: Option<PlannerSpec>,
     /// Seed instead of the mission's.
@@ -124,6 +126,9 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         if mission.sim.resources.is_some() {
             bail!("a mission with [resources] flies in one process only: add --in-process");
         }
+        if mission.link.is_some() {
+            bail!("a mission with [link] flies in one process only: add --in-process");
+        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
@@ -187,6 +192,9 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     if let Some(reason) = planner.missing() {
         out::say(format_args!("no planner {}: {reason}; {} takes over", mission.planner, planner.name()));
     }
+    if let Some(warning) = policies.warning(&mission.planner, &mission.sim) {
+        out::say(format_args!("warning: {warning}"));
+    }
     let period = flight.model().period;
     let mut planner = GatedPlanner { gate: Gate::new(&mission.approval, period), planner };
     let horizon = mission.horizon(flight.model());
@@ -207,6 +215,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
     output.write_alarms(&flight.board().take_journal())?;
+    output.write_ways(&flight.ways())?;
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
@@ -220,6 +229,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
         accepted: accepted as u64,
         orders: outcomes(&Stamper::new(mission.epoch_unix_s, period), flight.requests()),
         resources: flight.resources(),
+        link: flight.link_summary(),
         ..SummaryInputs::default()
     };
     Ok(Flown { summary: Summary::new(inputs, &totals, period), failure, safe_mode: None })

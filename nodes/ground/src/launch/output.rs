@@ -5,9 +5,11 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, bail};
+use serde::Serialize;
 
 use swath_mission::alarms::Entry;
 use swath_mission::file::{Mission, MissionRequests};
+use swath_mission::link::ground::WayLine;
 use swath_mission::orders::import;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
@@ -97,15 +99,24 @@ impl OutputFolder {
 
     /// Writes what happened to alarms as `alarms.jsonl`, if anything did.
     pub fn write_alarms(&self, journal: &[Entry]) -> Result<()> {
-        if journal.is_empty() {
+        self.write_lines("alarms.jsonl", journal)
+    }
+
+    /// Writes the ways of requests over the radio as `strips.jsonl`, if there is a radio.
+    pub fn write_ways(&self, ways: &[WayLine]) -> Result<()> {
+        self.write_lines("strips.jsonl", ways)
+    }
+
+    fn write_lines(&self, name: &str, lines: &[impl Serialize]) -> Result<()> {
+        if lines.is_empty() {
             return Ok(());
         }
         let mut text = String::new();
-        for entry in journal {
-            text += &serde_json::to_string(entry)?;
+        for line in lines {
+            text += &serde_json::to_string(line)?;
             text.push('\n');
         }
-        let path = self.path.join("alarms.jsonl");
+        let path = self.path.join(name);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 

@@ -8,22 +8,23 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::task_record;
+use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
-use swath_sim::model::Model;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 
 use super::fleet::{Event, Fleet, Happened};
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
-use swath_mission::alarms::conditions::{Report, of_plan, report_all};
-use swath_mission::alarms::{Board, Entry, Key};
+use crate::alarms::FlyingBoard;
+use swath_mission::alarms::Key;
+use swath_mission::alarms::conditions::{Report, of_plan};
+use swath_mission::fallback::{Deciders, Policies, fallback, made_instead};
 use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
-use swath_mission::guarded::{Deciders, Policies, fallback, made_instead};
 use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
@@ -38,6 +39,8 @@ const START_TIMEOUT: Duration = Duration::from_secs(20);
 const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long the last summary of the requests may take.
 const SUMMARY_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long what happened to alarms waits for more before it is written.
+const JOURNAL_DELAY: Duration = Duration::from_millis(500);
 const WAIT: Duration = Duration::from_millis(100);
 /// How long nodes that are started again at the very end may take to be there.
 const WHOLE_TIMEOUT: Duration = Duration::from_secs(20);
@@ -69,9 +72,9 @@ pub fn fly(
     let record = wishes.record;
     if record {
         let bag = output.path().join("bag");
-        let mission = text(mission_file)?;
-        let words = ["record", "--use-sim-time", "--resume", "--manifest", &mission, "--output", &text(&bag)?];
-        let words = words.map(str::to_owned).into_iter().chain(manifest_data);
+        let (manifest, output) = (text(mission_file)?, text(&bag)?);
+        let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
+        let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
         let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(&namespace)).collect();
         fleet.start(graph::RECORDER, "swath-bag", &words)?;
         fleet.wait_for_line(graph::RECORDER, START_TIMEOUT)?;
@@ -85,7 +88,7 @@ pub fn fly(
     let Some(flown) = launcher.flown else {
         return Err(watched.err().unwrap_or_else(|| anyhow!("the mission has not begun")));
     };
-    output.write_alarms(&launcher.journal(flown.end))?;
+    output.write_alarms(&launcher.alarms.journal(flown.end))?;
     // The recorder ends first: the nodes' last messages reach it while they are still there.
     let recorded = fleet.stop(&[graph::RECORDER]).and_then(|()| match record {
         true => count_messages(&output.path().join("bag")),
@@ -115,6 +118,7 @@ pub fn fly(
         nodes,
         orders: orders(output),
         resources: None,
+        link: None,
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
 }
@@ -228,9 +232,9 @@ struct Launcher {
     last_summary: Option<msg::RequestSummary>,
     paced: bool,
     stamper: Stamper,
-    /// What nodes said of alarms. The journal is made of it at the end, because what two nodes say of one tick comes in
-    /// any order.
-    reports: Vec<Report>,
+    alarms: FlyingBoard,
+    /// When something happened to alarms that is not in the journal's file yet.
+    unwritten: Option<Instant>,
     /// What is ordered to befall the recorder, which knows of no mission.
     recorder_faults: VecDeque<(Scheduled, Failure)>,
     /// Why the mission is, or ended, in safe mode.
@@ -249,6 +253,8 @@ impl Launcher {
     fn start(mission: &Mission, ros: &RosArgs) -> Result<Self> {
         let node = Node::start(graph::LAUNCHER, ros)?;
         let model = mission.model()?;
+        let stamper = Stamper::new(mission.epoch_unix_s, model.period);
+        let planned = of_plan(&mission.faults, model.period);
         Ok(Self {
             shutdown: Shutdown::on_signals(node.signal())?,
             points: node.subscription(&graph::DECISION_POINT)?,
@@ -264,8 +270,9 @@ impl Launcher {
             log: TaskLog::default(),
             last_summary: None,
             paced: mission.pace > 0.0,
-            stamper: Stamper::new(mission.epoch_unix_s, model.period),
-            reports: of_plan(&mission.faults, model.period),
+            alarms: FlyingBoard::new(&node, model.period, stamper.clone(), planned)?,
+            unwritten: None,
+            stamper,
             recorder_faults: mission.faults.of(Process::Recorder, model.period).into(),
             safe_mode: None,
             model,
@@ -318,6 +325,7 @@ impl Launcher {
             }
             self.take_rest(output)?;
             self.mind(fleet)?;
+            self.mind_alarms(fleet, output)?;
             if !self.paced && last_news.elapsed() > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
             }
@@ -349,7 +357,7 @@ impl Launcher {
             let tick = self.stamper.tick_from(&array.header.stamp);
             for status in array.status {
                 tracing::debug!("{}: {}", status.name, status.message);
-                self.reports.extend(report(tick, status));
+                report(tick, status).into_iter().for_each(|report| self.alarms.report(report));
             }
         }
         Ok(())
@@ -376,7 +384,7 @@ impl Launcher {
         let tick = self.stamper.tick_from(&stamp(fleet.now_ns()));
         let mut tell = |name: &str, wrong: bool, text: &str| {
             let key = Key::new(graph::LAUNCHER, name);
-            self.reports.push(Report { tick, key, wrong, text: text.to_owned() });
+            self.alarms.report(Report { tick, key, wrong, text: text.to_owned() });
         };
         let lost = format!("{node} lost");
         match what {
@@ -410,7 +418,7 @@ impl Launcher {
             return Ok(());
         }
         let key = Key::new(graph::LAUNCHER, "safe mode");
-        self.reports.push(Report { tick, key, wrong: true, text: reason.clone() });
+        self.alarms.report(Report { tick, key, wrong: true, text: reason.clone() });
         let again = self.safe_mode.replace(reason.clone()).is_some();
         if node != graph::PLANNER || again {
             bail!("{reason}");
@@ -420,12 +428,18 @@ impl Launcher {
         Ok(())
     }
 
-    /// What happened to the alarms of a mission that has ended.
-    fn journal(&mut self, end: Tick) -> Vec<Entry> {
-        let mut board = Board::new(self.model.period);
-        report_all(&mut board, std::mem::take(&mut self.reports));
-        board.advance(end);
-        board.take_journal()
+    /// Tells what happened to alarms, and keeps it in the journal's file.
+    fn mind_alarms(&mut self, fleet: &Fleet, output: &OutputFolder) -> Result<()> {
+        let Some(flown) = self.flown else { return Ok(()) };
+        let now = self.stamper.tick_from(&stamp(fleet.now_ns())).clamp(flown.end, self.horizon);
+        if self.alarms.step(now)? {
+            self.unwritten.get_or_insert_with(Instant::now);
+        }
+        if self.unwritten.is_some_and(|since| since.elapsed() > JOURNAL_DELAY) {
+            output.write_alarms(&self.alarms.journal(now))?;
+            self.unwritten = None;
+        }
+        Ok(())
     }
 
     /// Waits for the last rewards and the last summary of the request manager.
@@ -437,6 +451,7 @@ impl Launcher {
                 break;
             }
             self.take_rest(output)?;
+            self.mind_alarms(fleet, output)?;
             self.node.wait(WAIT)?;
         }
         let end = self.flown.map_or(Tick(0), |flown| flown.end);

@@ -1,5 +1,6 @@
-//! `swath strips` and `swath planner`: an operator's command line to a flying mission.
+//! `swath strips`, `swath planner` and `swath alarms`: an operator's command line to a flying mission.
 
+mod alarms;
 mod client;
 mod cover;
 mod export;
@@ -12,6 +13,7 @@ mod show;
 mod submit;
 mod watch;
 
+pub use alarms::{AlarmsArgs, run as run_alarms};
 pub use planner::{PlannerArgs, run as run_planner};
 
 use anyhow::Result;

@@ -3,11 +3,11 @@
 
 use proptest::prelude::*;
 use swath_sim::config::SimConfig;
-use swath_sim::model::Model as Constants;
 use swath_sim::rng;
 use swath_sim::task::{FailureReason, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model as Constants;
 use swath_sim::world::strip::{StripId, StripRequest};
 
 use super::store::{Durability, Store};

@@ -2,12 +2,12 @@
 
 use rusqlite::Connection;
 use swath_sim::config::SimConfig;
-use swath_sim::model::Model;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
 use swath_sim::task::{FailureReason, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
 use super::store::{Durability, Store, StoreError};

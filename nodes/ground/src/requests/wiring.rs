@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::{situation, task_record};
+use swath_node::messages::decision_point::situation;
+use swath_node::messages::task_result::task_record;
 use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;

@@ -42,6 +42,23 @@ pub enum Event {
     Unshelved,
 }
 
+impl Event {
+    /// The events, in the order of their numbers.
+    pub const ALL: [Self; 5] = [Self::Raised, Self::Returned, Self::Acknowledged, Self::Shelved, Self::Unshelved];
+
+    /// Its name in messages, files and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raised => "raised",
+            Self::Returned => "returned",
+            Self::Acknowledged => "acknowledged",
+            Self::Shelved => "shelved",
+            Self::Unshelved => "unshelved",
+        }
+    }
+}
+
 /// A line of the journal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
@@ -139,6 +156,12 @@ impl Board {
             board.now = board.now.max(entry.tick);
         }
         board
+    }
+
+    /// Where time stands.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.now
     }
 
     /// A node says whether something is wrong, and what. `severity` counts where the table has none.

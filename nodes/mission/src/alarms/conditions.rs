@@ -5,6 +5,7 @@ use swath_sim::vehicle::health::Health;
 
 use super::board::{Board, Key};
 use super::definitions::Severity;
+use super::wishes::Wish;
 use crate::faults::grammar::{Failure, Process, What};
 use crate::faults::plan::{FaultPlan, Scheduled};
 
@@ -12,6 +13,8 @@ use crate::faults::plan::{FaultPlan, Scheduled};
 const GUIDANCE: &str = "guidance";
 /// Who tells of planners that are replaced.
 const PLANNER: &str = "planner";
+/// Who tells of a ground that is not heard.
+const CATALOGUE: &str = "catalogue";
 /// Who tells of lost nodes.
 const LAUNCHER: &str = "launcher";
 
@@ -35,12 +38,19 @@ impl Report {
 }
 
 /// Tells the board of reports, in the order of their ticks, and of the nodes' names at one tick, in which order ever they
-/// came.
-pub fn report_all(board: &mut Board, mut reports: Vec<Report>) {
+/// came; and of operators' wishes, each after the reports up to its tick.
+pub fn report_all(board: &mut Board, mut reports: Vec<Report>, wishes: &[Wish]) {
     reports.sort_by(|a, b| (a.tick, &a.key).cmp(&(b.tick, &b.key)));
+    let mut wishes = wishes.iter().peekable();
+    // A wish was followed when it came; what it met may have come in another order then.
+    let follow = |wish: &Wish, board: &mut Board| _ = wish.follow(board);
     for Report { tick, key, wrong, text } in reports {
+        while let Some(wish) = wishes.next_if(|wish| wish.tick < tick) {
+            follow(wish, board);
+        }
         board.report(tick, key, Severity::Error, wrong, &text);
     }
+    wishes.for_each(|wish| follow(wish, board));
 }
 
 /// What guidance reports of wheels and sensors.
@@ -68,6 +78,13 @@ pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
 pub fn of_planner(tick: Tick, replaced: Option<&str>, name: &str) -> Report {
     let text = replaced.map_or_else(|| "it decides".to_owned(), |reason| format!("{reason}; {name} takes over"));
     Report::new(tick, PLANNER, "planner replaced", replaced.is_some(), text)
+}
+
+/// What the on-board catalogue reports of the ground, which it has heard last at a tick.
+#[must_use]
+pub fn of_ground(tick: Tick, heard: Tick, silent: bool) -> Report {
+    let text = if silent { format!("nothing is heard since {heard}") } else { "it is heard".to_owned() };
+    Report::new(tick, CATALOGUE, "ground silent", silent, text)
 }
 
 /// What is reported of the faults by order that wheels and sensors do not show: when each begins and ends.

@@ -18,6 +18,9 @@ pub enum Severity {
 }
 
 impl Severity {
+    /// All of them, the gravest last.
+    pub const ALL: [Self; 3] = [Self::Warn, Self::Error, Self::Critical];
+
     /// Its name in files and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -112,6 +115,15 @@ pub const DEFINITIONS: &[Definition] = &[
             "a node was lost more often than it is started again",
             "the attitude is held, nothing is imaged; what was acknowledged is kept",
             "look at the node's log; let the planner choose again when the cause is mended: `swath planner mode autonomous`",
+        ],
+    ),
+    lasting(
+        "ground silent",
+        Severity::Error,
+        [
+            "the satellite has heard no frame from the ground for `command_loss_h`",
+            "it holds its attitude and images nothing until it hears one",
+            "look at the next passes (`swath passes`) and at the stations",
         ],
     ),
     moment(

@@ -5,6 +5,7 @@ pub mod board;
 pub mod conditions;
 pub mod definitions;
 pub mod state;
+pub mod wishes;
 
 pub use board::{Board, Entry, Event, Key, OperatorError, Standing};
 pub use definitions::{DEFINITIONS, Definition, Severity};

@@ -1,5 +1,6 @@
 //! What was asked for and taken: the part of a mission that its file does not tell.
 
+use serde::{Deserialize, Serialize};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
@@ -22,7 +23,7 @@ pub struct Action {
 }
 
 /// What an operator decides on a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Review {
     /// A held request is accepted.
     Release,

@@ -1,9 +1,10 @@
 //! An order: what is asked for, by whom, under which names and conditions.
 
+use serde::{Deserialize, Serialize};
 use swath_sim::world::strip::StripRequest;
 
 /// A request with the names that its submitter gave it, and its conditions.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
     /// Submitter's own reference; empty without one.
     pub client_ref: String,
@@ -26,7 +27,7 @@ pub struct Order {
 }
 
 /// Which strip of a line or area it is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// Reference of the whole, the same for all of its strips.
     pub order_ref: String,

@@ -100,8 +100,8 @@ impl Passes {
 
 #[cfg(test)]
 mod tests {
-    use swath_sim::model::Model;
     use swath_sim::time::Tick;
+    use swath_sim::vehicle::model::Model;
     use swath_sim::world::frames::latitude_longitude_deg;
     use swath_sim::world::orbit::{Orbit, OrbitPhase};
 

@@ -80,6 +80,20 @@ impl RequestLogic {
         }
         let ways = self.prepare(order, at)?;
         self.check_same_strip(order, replaces)?;
+        self.enter(order, ways, replaces, at)
+    }
+
+    /// Gives a request, which may be one for each way, the next number.
+    ///
+    /// # Errors
+    /// When its state cannot be.
+    pub(super) fn enter(
+        &mut self,
+        order: &Order,
+        ways: Vec<(StripRequest, Prepared)>,
+        replaces: Option<StripId>,
+        at: Tick,
+    ) -> Result<StripId, Refusal> {
         let state = State::Received.step(if order.hold_for_approval { State::Held } else { State::Accepted });
         let state = state.map_err(|illegal| Refusal::State { id: 0, illegal })?;
         let first = StripId::from_index(self.len());

@@ -1,5 +1,6 @@
 //! What the request manager writes down: requests as they came, every change of them, every attempt.
 
+use serde::{Deserialize, Serialize};
 use swath_sim::task::FailureReason;
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
@@ -43,7 +44,7 @@ pub struct Added {
 }
 
 /// A change of a request.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// The request; 0 for one that was refused.
     pub id: StripId,
@@ -62,7 +63,7 @@ pub struct Change {
 }
 
 /// What a request has gone through so far.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Standing {
     /// Attempts flown.
     pub attempts: u32,
@@ -77,7 +78,7 @@ pub struct Standing {
 }
 
 /// How an attempt ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Outcome {
     /// Imaged.
     Succeeded,
@@ -88,7 +89,7 @@ pub enum Outcome {
 }
 
 /// An attempt that has ended.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Attempt {
     /// The strip.
     pub id: StripId,

@@ -1,9 +1,10 @@
 //! The life cycle of a strip request: its states, and the one function that every change of state goes through.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Where a strip request stands (the STATE constants of `swath_msgs/msg/StripStatus`, in their order).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum State {
     /// Arrived, not yet looked at.

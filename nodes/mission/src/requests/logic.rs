@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 
 use swath_sim::mission::windows_until;
-use swath_sim::model::Model;
 use swath_sim::requests::catalogue::Entry as Listed;
 use swath_sim::requests::catalogue::{Candidate, Catalogue, Prepared};
 use swath_sim::task::TaskRecord;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::orbit::Orbit;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
@@ -275,7 +275,7 @@ impl RequestLogic {
         }
     }
 
-    fn taken(&mut self, at: Tick, actor: String, reason: String, act: Act) {
+    pub(super) fn taken(&mut self, at: Tick, actor: String, reason: String, act: Act) {
         let action = Action { at, initial: !self.begun, actor, reason, act };
         self.journal.push(Entry::Taken(Box::new(action)));
     }
@@ -465,7 +465,13 @@ impl RequestLogic {
     }
 
     /// A request leaves for good.
-    fn leave(&mut self, id: StripId, to: State, reason: (Reason, String), actor: &str) -> Result<(), Refusal> {
+    pub(super) fn leave(
+        &mut self,
+        id: StripId,
+        to: State,
+        reason: (Reason, String),
+        actor: &str,
+    ) -> Result<(), Refusal> {
         self.stand(id, to, reason, actor)?;
         self.catalogue.remove(id);
         self.abort_if_under_way(id);
@@ -491,8 +497,12 @@ impl RequestLogic {
     /// A change that was reported rather than asked for: if the life cycle does not have it, someone must hear of it.
     pub(super) fn must(&mut self, id: StripId, to: State, reason: (Reason, String), actor: &str) {
         if let Err(refusal) = self.stand(id, to, reason, actor) {
-            self.contradictions.push(Contradiction { actor: actor.to_owned(), refusal });
+            self.contradicted(actor, refusal);
         }
+    }
+
+    pub(super) fn contradicted(&mut self, actor: &str, refusal: Refusal) {
+        self.contradictions.push(Contradiction { actor: actor.to_owned(), refusal });
     }
 
     pub(super) fn note(&mut self, id: StripId) {

@@ -1,5 +1,6 @@
 //! Strip requests without ROS and without a store: their life cycle, their logic, and every reason to refuse one.
 
+mod apart;
 pub mod index;
 mod intake;
 pub mod journal;

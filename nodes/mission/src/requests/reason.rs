@@ -1,10 +1,11 @@
 //! Every reason that is given for a state, an attempt or a refusal, with its number.
 
+use serde::{Deserialize, Serialize};
 use swath_sim::error::StripError;
 use swath_sim::task::FailureReason;
 
 /// Why something is as it is: the REASON constants of `swath_msgs/msg/StripStatus`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[repr(u16)]
 pub enum Reason {
     /// Nothing to explain.

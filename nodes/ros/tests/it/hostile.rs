@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use swath_msgs::rmw_dds_common::{Gid, NodeEntitiesInfo, ParticipantEntitiesInfo};
 use swath_msgs::swath_msgs::{RequestSummary, SpacecraftState, SubmitStripsRequest, SubmitStripsResponse};
 use swath_ros::{Cdr, Node, Subscription, Trouble, encode, graph};
 
@@ -166,6 +167,33 @@ fn a_program_of_others_may_take_a_node_s_place_if_that_is_declared() {
     assert_eq!(received.wait(guidance.signal(), PATIENCE).unwrap().unwrap().tick, 5);
 }
 
+/// Of two that come up together one goes, by the order of their identities; one that is there stays.
+#[test]
+fn a_node_that_takes_the_name_of_one_later_ends_nobody() {
+    let trial = Trial::new(47);
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    // Of CycloneDDS, and of RustDDS; both come before any other identity.
+    for (number, vendor) in [(10, 0x10), (11, 0x12)] {
+        let mut stranger = Stranger::new(trial.domain, number);
+        stranger.announce_writer("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
+        std::thread::sleep(Duration::from_millis(300));
+        let node = NodeEntitiesInfo {
+            node_namespace: trial.namespace.clone(),
+            node_name: "spacecraft".to_owned(),
+            ..Default::default()
+        };
+        let mut data = [0; 16];
+        data[..2].copy_from_slice(&[1, vendor]);
+        let info = ParticipantEntitiesInfo { gid: Gid { data }, node_entities_info_seq: vec![node] };
+        stranger.write(1, encode(&info).unwrap().as_bytes());
+        let notice = eventually(|| spacecraft.notices().into_iter().next());
+        assert_eq!((notice.trouble, notice.topic), (Trouble::Namesake, trial.full("spacecraft")));
+        spacecraft.wait(Duration::ZERO).unwrap();
+    }
+    assert!(trial.start(graph::SPACECRAFT, "").is_err(), "a node of ours does not come up beside it");
+}
+
 /// A panic in RustDDS ends its thread, not the process: without a sign of life it is started anew, and all goes on.
 #[test]
 fn a_node_whose_dds_has_died_starts_it_anew() {
@@ -181,7 +209,7 @@ fn a_node_whose_dds_has_died_starts_it_anew() {
     spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
     let before = states.gid();
     let stranger = Stranger::new(trial.domain, 7);
-    stranger.send_file("03_nackfrag_base0_56B.hex", false);
+    stranger.send_file("03_nackfrag_base0_56B", false);
     let mut renewed = 0;
     eventually(|| {
         spacecraft.check().unwrap();
@@ -211,8 +239,7 @@ fn datagrams_that_would_end_a_node_are_dropped_and_told_of() {
     let received = guidance.subscription(&graph::SPACECRAFT_STATE).unwrap();
     spacecraft.wait_for_peers(&[graph::GUIDANCE], PATIENCE).unwrap();
     let stranger = Stranger::new(trial.domain, 9);
-    let harmful =
-        ["03_nackfrag_base0_56B.hex", "04_heartbeat_long_range_52B.hex", "06_datafrag_4GiB_57B_any_prefix.hex"];
+    let harmful = ["03_nackfrag_base0_56B", "04_heartbeat_long_range_52B", "06_datafrag_4GiB_57B_any_prefix"];
     for file in harmful {
         stranger.send_file(file, false);
         stranger.send_file(file, true);

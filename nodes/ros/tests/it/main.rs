@@ -7,4 +7,5 @@ mod hostile;
 mod nodes;
 mod rosout;
 mod stopped;
+#[allow(dead_code, reason = "others use more of it")]
 mod stranger;

@@ -5,6 +5,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use swath_ros::{Environment, Mapping, Node, RosArgs, graph};
 
+use crate::common::eventually;
+
 /// The first node of a process has its log, so this test has a process of its own.
 #[test]
 fn log_lines_reach_rosout() {
@@ -24,6 +26,9 @@ fn log_lines_reach_rosout_in_a_process_of_their_own() {
     let node = Node::start_in(environment.clone(), graph::PLANNER, &args).unwrap();
     let listener = Node::start_in(environment, graph::LAUNCHER, &args).unwrap();
     let lines = listener.subscription(&graph::ROSOUT).unwrap();
+    // Lines are latched, but not for ever.
+    let offered = eventually(|| listener.remote_writers().into_iter().find(|writer| writer.topic == "/rosout"));
+    assert_eq!(offered.qos.lifespan, Some(Duration::from_secs(10)));
     node.clock().set_ns(1_500_000_000);
     tracing::warn!(limit = 3, "too much");
     let deadline = Instant::now() + Duration::from_secs(20);

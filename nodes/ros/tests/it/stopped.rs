@@ -1,6 +1,7 @@
 //! Nodes in processes of their own, which are stopped, or run out of memory.
 
 use std::os::unix::process::ExitStatusExt as _;
+use std::path::Path;
 use std::process::{Child, Command};
 use std::time::Duration;
 
@@ -15,9 +16,14 @@ struct Process(Child);
 
 impl Process {
     fn start(test: &str, trial: &Trial) -> Self {
+        Self::start_with(test, trial, &[])
+    }
+
+    fn start_with(test: &str, trial: &Trial, variables: &[(&str, &Path)]) -> Self {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args(["--exact", test, "--ignored", "--nocapture"]);
         command.env("TRIAL_DOMAIN", trial.domain.to_string()).env("TRIAL_NAMESPACE", &trial.namespace);
+        command.envs(variables.iter().copied());
         Self(command.spawn().unwrap())
     }
 
@@ -79,6 +85,33 @@ fn a_node_that_was_stopped_goes_on() {
     eventually(&mut answered);
 }
 
+/// Until its host's clock has caught up, RustDDS would hear of no new participant: for an hour here.
+#[test]
+fn who_comes_after_the_hosts_clock_was_set_back_is_heard() {
+    let trial = Trial::new(46);
+    let folder = tempfile::tempdir().unwrap();
+    let (library, offset) = (folder.path().join("clock.so"), folder.path().join("offset"));
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/c/clock.c");
+    let compiled = Command::new("cc").args(["-shared", "-fPIC", "-O2", source, "-o"]).arg(&library).status().unwrap();
+    assert!(compiled.success());
+    std::fs::write(&offset, "0").unwrap();
+    let watcher = trial.start(graph::PLANNER, "").unwrap();
+    let variables: [(&str, &Path); 2] = [("LD_PRELOAD", &library), ("CLOCK_OFFSET", &offset)];
+    let _guidance = Process::start_with("stopped::guidance_that_answers", &trial, &variables);
+    eventually(|| watcher.nodes().contains(&trial.full("guidance")).then_some(()));
+    std::fs::write(&offset, "-3600").unwrap();
+    let spacecraft = trial.start(graph::SPACECRAFT, "").unwrap();
+    let states = spacecraft.publisher(&graph::SPACECRAFT_STATE).unwrap();
+    let torques = spacecraft.subscription(&graph::WHEEL_TORQUE).unwrap();
+    for tick in 1..=3 {
+        eventually(|| {
+            states.publish(&SpacecraftState { tick, ..Default::default() }).unwrap();
+            let torque = torques.wait(spacecraft.signal(), Duration::from_millis(100)).unwrap();
+            torque.filter(|torque| torque.tick == tick)
+        });
+    }
+}
+
 #[test]
 #[ignore = "the process of another test"]
 fn guidance_of_little_memory() {
@@ -92,12 +125,12 @@ fn guidance_of_little_memory() {
 #[test]
 fn a_process_that_wants_too_much_memory_ends() {
     const SIGABRT: i32 = 6;
-    for (number, file) in [(22, "04_heartbeat_long_range_52B.hex"), (23, "06_datafrag_4GiB_57B_any_prefix.hex")] {
+    for (number, file) in [(22, "04_heartbeat_long_range_52B"), (23, "06_datafrag_4GiB_57B_any_prefix")] {
         let trial = Trial::new(number);
         let watcher = trial.start(graph::PLANNER, "").unwrap();
         let mut guidance = Process::start("stopped::guidance_of_little_memory", &trial);
         eventually(|| watcher.nodes().contains(&trial.full("guidance")).then_some(()));
-        let stranger = Stranger::towards(guidance.0.id(), trial.domain, 8);
+        let stranger = Stranger::towards(Some(guidance.0.id()), trial.domain, 8, 100);
         stranger.send_file(file, false);
         let status = eventually(|| guidance.0.try_wait().unwrap());
         assert_eq!(status.signal(), Some(SIGABRT), "{file}: {status}");

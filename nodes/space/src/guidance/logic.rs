@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
-use swath_sim::model::Model;
 use swath_sim::task::{Task, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
 use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::guidance::GuidanceTick;
 use swath_sim::vehicle::health::Health;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::StateSample;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;

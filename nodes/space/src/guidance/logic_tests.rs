@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::model::Model;
 use swath_sim::planner::{Heuristic, Planner};
 use swath_sim::rng;
 use swath_sim::task::{Task, TaskOutcome};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::initial::InitialState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 
 use super::logic::{Effect, GuidanceLogic, TaskError, TaskOrder};

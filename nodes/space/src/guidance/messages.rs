@@ -4,10 +4,13 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use swath_msgs::swath_msgs as msg;
 use swath_node::error::MessageError;
-use swath_node::messages::{acquisition, spacecraft_state, task_record, vector3};
+use swath_node::messages::numbers::vector3;
+use swath_node::messages::spacecraft_state::spacecraft_state;
+use swath_node::messages::strip::acquisition;
+use swath_node::messages::task_result::task_record;
 use swath_node::stamp::{BODY_FRAME, Stamper};
-use swath_sim::model::Model;
 use swath_sim::task::{FailureReason, Task};
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
 use super::logic::{Command, DecisionPoint, FinishedTask, Kept, TaskOrder};

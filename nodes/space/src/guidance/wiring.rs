@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::state_sample;
+use swath_node::messages::spacecraft_state::state_sample;
 use swath_ros::{Publisher, Spec, Subscription, graph};
 
 use swath_sim::time::Tick;

@@ -1,10 +1,10 @@
 //! The planner node without ROS: it decides when both the situation and the candidates of a task are known.
 
-use swath_sim::model::Model;
 use swath_sim::planner::{Decision, DecisionContext, Planner, Rationale};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{Task, TaskRecord};
 use swath_sim::vehicle::flight::Situation;
+use swath_sim::vehicle::model::Model;
 
 use swath_mission::approval::{Gate, GatedPlanner};
 
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
     use swath_mission::approval::ApprovalConfig;
-    use swath_mission::guarded::GuardedPlanner;
+    use swath_mission::fallback::GuardedPlanner;
 
     fn logic(env: &Env, planner: impl Planner + Send + 'static) -> PlannerLogic {
         let gate = Gate::new(&ApprovalConfig::default(), env.model().period);

@@ -2,14 +2,14 @@
 
 use swath_msgs::swath_msgs as msg;
 use swath_node::error::MessageError;
-use swath_node::messages::acquisition;
+use swath_node::messages::strip::acquisition;
 use swath_node::orders::mode_number;
 use swath_node::stamp::{EARTH_FRAME, Stamper};
-use swath_sim::model::Model;
 use swath_sim::planner::Decision;
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::Task;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 use swath_sim::world::windows::Window;
 

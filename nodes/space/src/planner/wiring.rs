@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result};
 use swath_mission::orders::action::{Act, Action};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::{situation, task_record};
+use swath_node::messages::decision_point::situation;
+use swath_node::messages::task_result::task_record;
 use swath_node::orders::{operator_action, planner_mode};
 use swath_ros::{Publisher, Server, Spec, Subscription, graph};
 use swath_sim::planner::PlannerSpec;
@@ -15,9 +16,9 @@ use super::logic::{Planned, PlannerLogic};
 use super::messages;
 use swath_mission::alarms::conditions::of_planner;
 use swath_mission::approval::{ApprovalConfig, Gate, GatedPlanner, Mode};
+use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
-use swath_mission::guarded::{GuardedPlanner, Policies};
 use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{Parameter, Program};
 
@@ -84,6 +85,9 @@ impl PlannerNode {
         let mode = base.node.parameters().declare(mode.read_only())?;
         base.node.parameters().check_given()?;
         let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
+        if let Some(warning) = policies.warning(&spec, &base.mission.sim) {
+            tracing::warn!("{warning}");
+        }
         let config = ApprovalConfig { mode: mode_at_start(&base, mode)?, ..base.mission.approval.clone() };
         let gate = Gate::new(&config, base.model.period);
         let planner = GatedPlanner { gate, planner };

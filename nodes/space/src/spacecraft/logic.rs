@@ -133,9 +133,9 @@ impl SpacecraftLogic {
 #[cfg(test)]
 mod tests {
     use swath_sim::config::SimConfig;
-    use swath_sim::model::Model;
     use swath_sim::rng;
     use swath_sim::vehicle::initial::InitialState;
+    use swath_sim::vehicle::model::Model;
 
     use super::*;
 

@@ -9,7 +9,7 @@ use swath_ros::{Publisher, Spec, graph};
 use swath_sim::vehicle::mrp;
 use swath_sim::world::frames::latitude_longitude_deg;
 
-use swath_node::messages::vector3;
+use swath_node::messages::numbers::vector3;
 use swath_node::node::MissionNode;
 use swath_node::program::Parameter;
 use swath_node::stamp::{BODY_FRAME, EARTH_FRAME, INERTIAL_FRAME, ORBIT_FRAME};

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
-use swath_node::messages::spacecraft_state;
+use swath_node::messages::spacecraft_state::spacecraft_state;
 use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 

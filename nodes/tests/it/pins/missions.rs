@@ -68,7 +68,11 @@ fn fly(place: &Place, mission: &str, more: &str, text: &mut String) {
     _ = writeln!(text, "summary {}", summary(place, out));
     _ = writeln!(text, "requests {}", sha256(place.read(&format!("{out}/requests.geojson"))));
     _ = writeln!(text, "choices of {} tasks {}", lines.len(), sha256(choices));
-    _ = writeln!(text, "tasks {}\n", sha256(tasks));
+    _ = writeln!(text, "tasks {}", sha256(tasks));
+    if place.path(out).join("strips.jsonl").exists() {
+        _ = writeln!(text, "ways {}", sha256(place.read(&format!("{out}/strips.jsonl"))));
+    }
+    text.push('\n');
     std::fs::remove_dir_all(place.path(out)).unwrap();
 }
 
@@ -89,6 +93,15 @@ fn missions_by_hand_written_planners() {
 #[test]
 fn missions_by_policies() {
     golden::check("missions/policies.txt", &in_process(POLICIES));
+}
+
+#[test]
+fn missions_over_the_radio() {
+    let mut text =
+        in_process(&["radio.toml", "radio.toml --planner beam --seed 2", "radio.toml --planner heuristic:80 --seed 3"]);
+    let passes = "swath passes <pins>/missions/radio.toml --hours 12";
+    _ = writeln!(text, "$ {passes}\n{}", Place::new().succeed(passes));
+    golden::check("missions/radio.txt", &text);
 }
 
 /// The files that a mission leaves say all that was flown, every default included; the beginning of each.

@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use swath_sim::config::{RAD_S_PER_RPM, SimConfig};
-use swath_sim::model::Model;
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::dynamics::BodyState;
+use swath_sim::vehicle::model::Model;
 use swath_sim::world::orbit::Orbit;
 
 /// An object of a history.

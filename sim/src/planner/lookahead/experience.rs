@@ -113,8 +113,8 @@ mod tests {
     use super::*;
     use crate::config::SimConfig;
     use crate::learn::episode::{Env, EpisodeConfig};
-    use crate::model::Model;
     use crate::task::{TaskOutcome, TaskRecord};
+    use crate::vehicle::model::Model;
 
     fn env() -> Env {
         let episode = EpisodeConfig { orbits: 0.1, ..EpisodeConfig::default() };

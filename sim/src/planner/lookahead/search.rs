@@ -1,11 +1,11 @@
 //! The shortest transition with which a strip is imaged, found by flying it.
 
 use super::experience::Allowance;
-use crate::model::Model;
 use crate::requests::catalogue::Candidate;
 use crate::task::Task;
 use crate::time::Tick;
 use crate::vehicle::flight::{Flight, Situation};
+use crate::vehicle::model::Model;
 
 /// The transition is settled once the attitude error is below this share of its limit.
 const SETTLED_SHARE: f64 = 0.8;

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use crate::config::resources::{Antenna, Desaturation, ResourcesConfig};
-use crate::model::Model;
 use crate::time::Tick;
 use crate::vehicle::dynamics::{BodyState, Plant};
+use crate::vehicle::model::Model;
 use crate::vehicle::mrp::Rotation;
 use crate::vehicle::resources::battery::{Battery, SolarArray, WheelPower};
 use crate::vehicle::resources::momentum::{External, Rods, Thrusters};

@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { post, told } from "./api";
-import { info, shown, version, world } from "./store";
+import { info, shown, world } from "./store";
 import { clock, stamp } from "./time";
 import type { Alarm } from "./world";
 
@@ -12,13 +12,11 @@ const reason = signal("");
 
 /** Alarms that nobody has acknowledged or put aside. */
 export function standing(): Alarm[] {
-  version.value;
   const now = world.value;
   return [...now.alarms.values()].filter((alarm) => now.stands(alarm, now.now));
 }
 
 export function Alarms() {
-  version.value;
   const [now, t] = [world.value, shown.value];
   const stands = (alarm: Alarm) => now.stands(alarm, t);
   const alarms = [...now.alarms.values()]

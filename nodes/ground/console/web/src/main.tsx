@@ -8,7 +8,7 @@ import { WorldMap } from "./map";
 import { Planner } from "./planner";
 import { Plots } from "./plots";
 import { onlyState, Requests } from "./requests";
-import { connected, heard, info, locked, message, panel, shown, version, wall, world } from "./store";
+import { connected, heard, info, locked, message, panel, shown, wall, world } from "./store";
 import "./style.css";
 import { COMPLETED, ACCEPTED, EXPIRED, FAILED, HELD } from "./states";
 import { Submit } from "./submit";
@@ -27,7 +27,6 @@ const PANELS: { name: string; commands: boolean; show: () => preact.JSX.Element 
 ];
 
 function Header() {
-  version.value;
   const count = standing();
   const missing = world.value.nodes?.missing ?? [];
   const { live, title, caller } = info.value;

@@ -345,7 +345,6 @@ export function WorldMap() {
 }
 
 function Legend() {
-  version.value;
   const t = shown.value;
   const counts = new Map<number, number>();
   for (const strip of world.value.strips.values()) {

@@ -1,14 +1,13 @@
 // The planner: what it may do by itself, what it proposes, and what it chose among.
 
 import { post, told } from "./api";
-import { info, select, selected, shown, version, world } from "./store";
+import { info, select, selected, shown, world } from "./store";
 import { duration, window } from "./time";
 import { lastAt } from "./world";
 
 const MODES = ["autonomous", "approve", "hold"];
 
 export function Planner() {
-  version.value;
   const [now, t] = [world.value, shown.value];
   const status = lastAt(now.planner, t);
   const live = info.value.commands;

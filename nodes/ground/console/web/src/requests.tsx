@@ -5,7 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import { get, post, told, tellOutcomes, type Opportunity, type Outcome, type Report } from "./api";
 import { inView, reveal, view } from "./map";
 import { ACCEPTED, HELD, lookOf, STATES } from "./states";
-import { draft, drawn, focus, info, panel, replaced, select, selected, shown, version, world } from "./store";
+import { draft, drawn, focus, info, panel, replaced, select, selected, shown, world } from "./store";
 import { clock, stamp, window } from "./time";
 import type { ChangeFact } from "./facts";
 import type { Strip } from "./world";
@@ -25,7 +25,6 @@ interface Row {
 }
 
 const rows = computed<Row[]>(() => {
-  version.value;
   if (onlyInView.value) view.value;
   const [now, t, sought] = [world.value, shown.value, text.value.toLowerCase()];
   const found: Row[] = [];

@@ -15,9 +15,16 @@ export interface Info {
   commands: boolean;
 }
 
-export const world = signal(new World());
-/** Counts what came in; whoever shows the world reads it. */
+const kept = signal(new World());
+/** Counts what came in. */
 export const version = signal(0);
+/** What is known: whoever reads it shows it again when something has come in. */
+export const world = {
+  get value(): World {
+    version.value;
+    return kept.value;
+  },
+};
 export const info = signal<Info>({ live: false, title: "", run: "", elevation_min_deg: 0, caller: null, commands: false });
 export const connected = signal(false);
 /** Whether the server wants a token. */
@@ -44,10 +51,7 @@ export const draft = signal({ name: "", priority: 0.5, speed: 3000, hold: false,
 export const message = signal("");
 
 /** The time that is shown [ms]. */
-export const shown = computed(() => {
-  version.value;
-  return cursor.value ?? world.value.now;
-});
+export const shown = computed(() => cursor.value ?? world.value.now);
 
 /** The span of the time axis [ms]. */
 export const axis = signal<[number, number] | null>(null);
@@ -68,7 +72,7 @@ export function take(facts: readonly Fact[]): void {
 
 export function restart(): void {
   batch(() => {
-    world.value = new World();
+    kept.value = new World();
     version.value += 1;
   });
 }

@@ -224,7 +224,6 @@ export function Timeline() {
 
 /** The bar above the timeline: the time that is shown, and how to move it. */
 export function TimeBar() {
-  version.value;
   const [now, t] = [world.value, shown.value];
   const task = now.taskAt(t);
   const strip = task && now.strips.get(task.strip);

@@ -1,5 +1,6 @@
-//! `swath export`: a recorded mission as tables, GeoJSON and CZML.
+//! `swath export`: a recorded mission as tables, GeoJSON, CZML, and as the messages of CCSDS.
 
+mod ccsds;
 mod czml;
 pub mod geo;
 pub mod table;
@@ -21,8 +22,8 @@ use track::Track;
 #[command(after_help = "Example:
   swath export bags/samples/mission -o out/export --format csv geojson
 
-Writes tasks, states and decisions as .csv and .parquet, strips.geojson and ground_track.geojson, and
-mission.czml with orbit and attitude for Cesium.")]
+Writes tasks, states and decisions as .csv and .parquet, strips.geojson and ground_track.geojson,
+mission.czml with orbit and attitude for Cesium, and both as CCSDS messages, orbit.oem and attitude.aem.")]
 pub struct ExportArgs {
     #[command(flatten)]
     recorded: RecordedArgs,
@@ -48,6 +49,10 @@ pub enum Format {
     Geojson,
     /// Orbit and attitude for Cesium.
     Czml,
+    /// The orbit as CCSDS Orbit Ephemeris Message.
+    Oem,
+    /// The attitude as CCSDS Attitude Ephemeris Message.
+    Aem,
 }
 
 impl ExportArgs {
@@ -66,7 +71,7 @@ impl ExportArgs {
             tables::write_states(&recorded, folder, tables)?;
             tables::write_decisions(&recorded, folder, tables)?;
         }
-        if wanted(Format::Geojson) || wanted(Format::Czml) {
+        if [Format::Geojson, Format::Czml, Format::Oem, Format::Aem].into_iter().any(wanted) {
             let track = Track::read(&recorded, self.step)?;
             if wanted(Format::Geojson) {
                 geo::write_strips(&recorded, folder)?;
@@ -74,6 +79,12 @@ impl ExportArgs {
             }
             if wanted(Format::Czml) {
                 czml::write_czml(&recorded, &track, folder)?;
+            }
+            if wanted(Format::Oem) {
+                ccsds::write_oem(&recorded, &track, folder)?;
+            }
+            if wanted(Format::Aem) {
+                ccsds::write_aem(&recorded, &track, folder)?;
             }
         }
         Ok(ExitCode::SUCCESS)

@@ -3,9 +3,9 @@
 use anyhow::Result;
 use nalgebra::{UnitQuaternion, Vector3};
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::state_sample;
+use swath_node::messages::spacecraft_state::state_sample;
 
-use crate::debrief::places::{Place, attitude_E, position_E, sub_satellite};
+use crate::debrief::places::{Place, attitude_E, position_E, sub_satellite, velocity_E};
 use crate::debrief::recorded::Recorded;
 
 /// The satellite's way over the ground.
@@ -22,6 +22,8 @@ pub struct TrackPoint {
     pub place: Place,
     /// The satellite in the planet-fixed frame [m].
     pub r_E: Vector3<f64>,
+    /// The satellite's velocity as that frame sees it [m/s].
+    pub v_E: Vector3<f64>,
     /// The rotation that takes body components to planet-fixed ones; neighbours have like signs.
     pub attitude_E: UnitQuaternion<f64>,
 }
@@ -35,6 +37,7 @@ impl Track {
         let period = recorded.model.period;
         let every = u64::from(period.ticks_ceil(step_s).max(1));
         let mut earth = recorded.model.earth.clone();
+        let rotation_rad_s = recorded.model.config.earth.rotation_rad_s;
         let mut points: Vec<TrackPoint> = Vec::new();
         let mut last = None;
         let mut add = |state: &msg::SpacecraftState| -> Result<()> {
@@ -48,6 +51,7 @@ impl Track {
                 time_s: period.time_s(sample.tick),
                 place: sub_satellite(&mut earth, &sample),
                 r_E: position_E(&mut earth, &sample),
+                v_E: velocity_E(&mut earth, rotation_rad_s, &sample),
                 attitude_E: attitude,
             });
             Ok(())

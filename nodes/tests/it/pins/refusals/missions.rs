@@ -26,6 +26,13 @@ const FILES: &[Case] = &[
     (&[("m.toml", "[sim.spacecraft]\nwheel_inertia_kg_m2 = 90.0")], LAUNCH),
     (&[("m.toml", "[sim.requests]\nlength_min_km = 600.0")], LAUNCH),
     (&[("m.toml", "[initial.orbit]\nraan_deg = 0.0")], LAUNCH),
+    (&[("m.toml", "[link]")], LAUNCH),
+    (&[("m.toml", "[link]\nstations = [\"atlantis\"]")], LAUNCH),
+    (&[("m.toml", "[link]\nstations = [\"tokyo\"]\nmask_deg = 91.0")], LAUNCH),
+    (&[("m.toml", "[link]\nstations = [\"tokyo\"]\nuplink_bps = 0")], LAUNCH),
+    (&[("m.toml", "[link]\nstations = [\"tokyo\"]")], "swath launch m.toml --out out"),
+    (&[("m.toml", "orbits = 1.0")], "swath passes m.toml"),
+    (&[("m.toml", "[link]\nstations = [\"tokyo\"]")], "swath passes m.toml --hours nan"),
 ];
 
 const OPTIONS: &[Case] = &[

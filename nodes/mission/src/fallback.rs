@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
+use swath_sim::config::SimConfig;
 use swath_sim::planner::{
     Decision, DecisionContext, Heuristic, Lookahead, Planner, PlannerError, PlannerSpec, Rationale,
 };
@@ -16,8 +17,19 @@ pub struct Policies {
     pub make: fn(&PlannerSpec, u64) -> Result<Box<dyn Planner + Send>>,
     /// SHA-256 of a planner's policy, in hexadecimal; nothing for a hand-written one.
     pub digest: fn(&PlannerSpec) -> Result<Option<String>>,
+    /// What an operator is told of a policy that was trained on another satellite than this one.
+    pub other_satellite: fn(&PlannerSpec, &SimConfig) -> Result<Option<String>>,
     /// Revision of the program's source.
     pub revision: &'static str,
+}
+
+impl Policies {
+    /// What an operator is told of a planner before it flies a satellite. That its policy cannot be read is told where
+    /// it is made.
+    #[must_use]
+    pub fn warning(&self, spec: &PlannerSpec, satellite: &SimConfig) -> Option<String> {
+        (self.other_satellite)(spec, satellite).ok().flatten()
+    }
 }
 
 /// Transition of the heuristic that takes over from a planner that fails [s].

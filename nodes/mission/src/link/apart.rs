@@ -1,0 +1,219 @@
+//! Ground, radio and satellite of a mission in one process.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use swath_sim::mission::RequestKeeper;
+use swath_sim::requests::catalogue::Candidate;
+use swath_sim::task::TaskRecord;
+use swath_sim::time::Tick;
+use swath_sim::vehicle::flight::Situation;
+use swath_sim::vehicle::initial::InitialState;
+
+use super::catalogue::Catalogue;
+use super::ground::Ground;
+use super::radio::{Direction, Radio};
+use crate::orders::action::Action;
+use crate::requests::journal::InFlight;
+use crate::requests::refusal::Refusal;
+
+/// Frames on their way, by the tick at which they arrive.
+type UnderWay = BTreeMap<Tick, Vec<Vec<u8>>>;
+
+/// Ground and satellite apart, and the radio between them.
+///
+/// Within a tick, frames arrive first, on board and on the ground; then comes what happens there; then both send.
+#[derive(Clone, Debug)]
+pub struct Apart {
+    ground: Ground,
+    space: Catalogue,
+    radio: Radio,
+    up: UnderWay,
+    down: UnderWay,
+    /// The last tick at which frames have arrived, and the last at which both have sent.
+    begun: Option<Tick>,
+    finished: Option<Tick>,
+    /// What is still to be asked of the ground, in order.
+    to_come: VecDeque<Action>,
+    refused: Vec<(Action, Refusal)>,
+    /// When the ground is lost and when it is back, in order; the last one may be under way.
+    away: VecDeque<(Tick, Tick)>,
+    /// What another ground is made of.
+    origin: (InitialState, Tick),
+}
+
+impl Apart {
+    /// Both ends at the epoch.
+    #[must_use]
+    pub fn new(ground: Ground, space: Catalogue, radio: Radio, origin: (InitialState, Tick)) -> Self {
+        Self {
+            ground,
+            space,
+            radio,
+            up: UnderWay::new(),
+            down: UnderWay::new(),
+            begun: None,
+            finished: None,
+            to_come: VecDeque::new(),
+            refused: Vec::new(),
+            away: VecDeque::new(),
+            origin,
+        }
+    }
+
+    /// What is asked of the ground on the way, in order, and when the ground is lost and back.
+    pub fn will_be_asked(&mut self, actions: Vec<Action>, away: VecDeque<(Tick, Tick)>) {
+        self.to_come.extend(actions);
+        self.away = away;
+    }
+
+    /// The ground.
+    #[must_use]
+    pub fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
+    /// The satellite.
+    #[must_use]
+    pub fn space(&self) -> &Catalogue {
+        &self.space
+    }
+
+    /// The radio.
+    #[must_use]
+    pub fn radio(&self) -> &Radio {
+        &self.radio
+    }
+
+    /// What was asked for and refused at once, and why.
+    #[must_use]
+    pub fn refused(&self) -> &[(Action, Refusal)] {
+        &self.refused
+    }
+
+    /// The next tick at which something happens.
+    fn next_event(&self) -> Option<Tick> {
+        let next = self.finished.map_or(Tick(0), |last| last.after(1));
+        let asked = self.to_come.front().map(|action| action.at.max(next));
+        let arrivals = [&self.up, &self.down].into_iter().filter_map(|it| it.keys().next().copied());
+        arrivals.chain(asked).chain(self.radio.next_open(next)).min()
+    }
+
+    /// A tick begins: frames arrive, and the ground is asked.
+    fn begin(&mut self, tick: Tick) {
+        if self.begun.is_some_and(|begun| begun >= tick) {
+            return;
+        }
+        self.begun = Some(tick);
+        for bytes in arrived(&mut self.up, tick) {
+            self.space.hear(tick, &bytes);
+        }
+        let frames = arrived(&mut self.down, tick);
+        if self.ground_is_away(tick) {
+            return;
+        }
+        for bytes in frames {
+            self.ground.hear(tick, &bytes);
+        }
+        while let Some(action) = self.to_come.pop_front_if(|action| action.at <= tick) {
+            if let Err(refusal) = self.ground.ask(action.clone(), tick) {
+                self.refused.push((action, refusal));
+            }
+        }
+    }
+
+    /// A tick ends: both send.
+    fn finish(&mut self, tick: Tick) {
+        let before = self.finished.replace(tick);
+        let open = self.radio.open(tick);
+        if !open || before.is_none_or(|before| before.after(1) != tick) {
+            self.ground.close();
+            self.space.close();
+        }
+        if open {
+            if !self.ground_is_away(tick) {
+                put(&mut self.up, self.radio.carry(Direction::Up, tick, self.ground.transmit(tick)));
+            }
+            put(&mut self.down, self.radio.carry(Direction::Down, tick, self.space.transmit(tick)));
+        }
+        for contradiction in self.space.take_contradictions().iter().chain(&self.ground.take_contradictions()) {
+            tracing::error!("{contradiction}");
+        }
+    }
+
+    /// Whether nobody is on the ground; who comes back to it knows what was kept.
+    fn ground_is_away(&mut self, now: Tick) -> bool {
+        while let Some(&(from, until)) = self.away.front() {
+            if now < from {
+                return false;
+            }
+            if now < until {
+                return true;
+            }
+            self.away.pop_front();
+            let (initial, horizon) = &self.origin;
+            match self.ground.restarted(initial, *horizon) {
+                Ok(fresh) => self.ground = fresh,
+                // Its strips were taken under the same limits.
+                Err(refusal) => tracing::error!("the ground cannot be made again: {refusal}"),
+            }
+        }
+        false
+    }
+
+    /// All that happens before a tick.
+    fn advance_to(&mut self, tick: Tick) {
+        while let Some(event) = self.next_event().filter(|event| *event < tick) {
+            self.begin(event);
+            self.finish(event);
+        }
+    }
+
+    /// A task that images a strip is flown up to `until`, unless the satellite hears that it is no longer wanted: then
+    /// the tick at which it does.
+    pub fn fly(&mut self, flown: InFlight, until: Tick) -> Tick {
+        self.space.on_task(flown);
+        let mut imaging = Some(flown.start.after(flown.t_pre));
+        loop {
+            let event = self.next_event().into_iter().chain(imaging).min().filter(|event| *event < until);
+            let Some(event) = event else { return until };
+            self.begin(event);
+            if self.space.take_aborts().iter().any(|abort| abort.task == flown.task) {
+                return event;
+            }
+            if imaging.take_if(|imaging| *imaging == event).is_some() {
+                self.space.on_imaging(flown.task, event);
+            }
+            self.finish(event);
+        }
+    }
+}
+
+impl RequestKeeper for Apart {
+    fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
+        self.advance_to(situation.now.after(1));
+        *candidates = self.space.on_decision_point(task, situation).candidates;
+    }
+
+    fn settle(&mut self, record: &TaskRecord) -> f64 {
+        self.advance_to(record.end);
+        self.begin(record.end);
+        let reward = self.space.on_result(record);
+        self.finish(record.end);
+        reward
+    }
+}
+
+/// Frames that have arrived at a tick.
+fn arrived(under_way: &mut UnderWay, tick: Tick) -> Vec<Vec<u8>> {
+    let mut frames = Vec::new();
+    while let Some(entry) = under_way.first_entry().filter(|entry| *entry.key() <= tick) {
+        frames.extend(entry.remove());
+    }
+    frames
+}
+
+fn put(under_way: &mut UnderWay, frames: Vec<(Tick, Vec<u8>)>) {
+    for (tick, bytes) in frames {
+        under_way.entry(tick).or_default().push(bytes);
+    }
+}

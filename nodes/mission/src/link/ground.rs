@@ -1,0 +1,343 @@
+//! The ground's end: takes what is asked for, sends it up, and learns what became of it.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use serde::Serialize;
+use swath_sim::time::Tick;
+use swath_sim::vehicle::initial::InitialState;
+use swath_sim::world::strip::StripId;
+
+use super::end::{Counts, End, Rates, Sent};
+use super::message::{CHANGES, Down, Housekeeping, ORDERS, Up, Wish, item, message};
+use crate::orders::action::{Act, Action, Review};
+use crate::requests::lifecycle::State;
+use crate::requests::logic::{Contradiction, RequestLogic};
+use crate::requests::refusal::Refusal;
+
+/// The way of a request up, and of its image down. Times are by the clock of who noted them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Way {
+    /// When the ground took it and it began to wait for a pass.
+    pub queued: Tick,
+    /// When the ground sent it first.
+    pub uplinked: Option<Tick>,
+    /// When the satellite took it up, by the satellite's clock.
+    pub on_board: Option<Tick>,
+    /// When the ground knew that.
+    pub acknowledged: Option<Tick>,
+    /// When it was imaged, by the satellite's clock.
+    pub imaged: Option<Tick>,
+    /// When the ground knew that.
+    pub known: Option<Tick>,
+    /// When all of the image was on the ground.
+    pub delivered: Option<Tick>,
+    /// Parts of the image that are.
+    parts: u32,
+}
+
+/// A change that the satellite decides on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// What was asked for.
+    pub action: Action,
+    /// When the ground sent it first.
+    pub uplinked: Option<Tick>,
+    /// When the satellite decided, by the satellite's clock.
+    pub decided: Option<Tick>,
+    /// When the ground knew that.
+    pub answered: Option<Tick>,
+    /// Why it was refused, such as because it came too late.
+    pub refusal: Option<String>,
+}
+
+/// What an item on the way up is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum About {
+    /// A request, which may be one for each way.
+    Request(StripId, u64),
+    /// A change, by its number.
+    Change(u64),
+}
+
+/// The ground's requests, and what it has heard of the satellite's.
+#[derive(Clone, Debug)]
+pub struct Ground {
+    requests: RequestLogic,
+    end: End,
+    rates: Rates,
+    ways: Vec<Way>,
+    asked: Vec<Asked>,
+    /// Items that were not sent yet, by class: their numbers, and what they are about.
+    unsent: [VecDeque<(u64, About)>; 2],
+    /// Number of the last item in the class of orders that is about a request.
+    in_line: BTreeMap<StripId, u64>,
+    housekeeping: Option<Housekeeping>,
+    misread: u64,
+}
+
+impl Ground {
+    /// A ground of which nothing was asked yet.
+    #[must_use]
+    pub fn new(requests: RequestLogic, rates: Rates) -> Self {
+        Self {
+            requests,
+            end: End::new(rates),
+            rates,
+            ways: Vec::new(),
+            asked: Vec::new(),
+            unsent: Default::default(),
+            in_line: BTreeMap::new(),
+            housekeeping: None,
+            misread: 0,
+        }
+    }
+
+    /// The one that takes over when this one is lost: it knows what was kept, and nothing else.
+    ///
+    /// # Errors
+    /// When a request is no strip.
+    pub fn restarted(&self, initial: &InitialState, horizon: Tick) -> Result<Self, Refusal> {
+        Ok(Self {
+            requests: self.requests.restarted(initial, horizon)?,
+            end: End::restored(self.rates, self.end.kept()),
+            ..self.clone()
+        })
+    }
+
+    /// The requests as the ground knows them.
+    #[must_use]
+    pub fn requests(&self) -> &RequestLogic {
+        &self.requests
+    }
+
+    /// The way of a request.
+    #[must_use]
+    pub fn way(&self, id: StripId) -> Option<&Way> {
+        self.ways.get(id.index()?)
+    }
+
+    /// Changes that were asked for, by their numbers from 1.
+    #[must_use]
+    pub fn asked(&self) -> &[Asked] {
+        &self.asked
+    }
+
+    /// The last housekeeping that came down.
+    #[must_use]
+    pub fn housekeeping(&self) -> Option<&Housekeeping> {
+        self.housekeeping.as_ref()
+    }
+
+    /// What was seen of the air.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.end.counts()
+    }
+
+    /// Messages that came whole and could not be read.
+    #[must_use]
+    pub fn misread(&self) -> u64 {
+        self.misread
+    }
+
+    /// Changes and orders that are not known to have arrived.
+    #[must_use]
+    pub fn waiting(&self) -> u64 {
+        self.end.waiting().iter().sum()
+    }
+
+    /// Takes what is asked for. A request gets its number at once; what is asked of a request is decided on board.
+    ///
+    /// # Errors
+    /// Why it is refused at once.
+    pub fn ask(&mut self, action: Action, now: Tick) -> Result<(), Refusal> {
+        self.requests.wait_until(now);
+        let known = self.requests.len();
+        match action.act.clone() {
+            Act::Submit(_, order) => {
+                self.requests.submit(*order.clone(), now)?;
+                self.send_order(known, *order, None, now);
+            }
+            Act::Replace(old, order) => {
+                self.requests.replace_when_heard(old, *order.clone(), now)?;
+                self.send_order(known, *order, Some(old), now);
+            }
+            Act::Cancel(id) => {
+                self.requests.still_open(id, State::CancelledByUser)?;
+                self.send_change(action, id, Wish::Cancel);
+            }
+            Act::Review(id, review) => {
+                let to = match review {
+                    Review::Release => State::Accepted,
+                    Review::Reject => State::Rejected,
+                    Review::Hold => State::Held,
+                };
+                self.requests.still_open(id, to)?;
+                self.send_change(action, id, Wish::Review(review));
+            }
+            // These are the planner's.
+            Act::SetMode(_) | Act::Decide { .. } => {}
+        }
+        Ok(())
+    }
+
+    /// Sends up the requests from number `known` + 1 on; none when what was asked for was known.
+    fn send_order(&mut self, known: usize, order: crate::orders::order::Order, replaces: Option<StripId>, now: Tick) {
+        let count = self.requests.len() - known;
+        if count == 0 {
+            return;
+        }
+        let id = StripId::from_index(known);
+        self.ways.resize(self.requests.len(), Way { queued: now, ..Way::default() });
+        let number = self.end.push(ORDERS, item(&Up::Order { id, at: now, replaces, order: Box::new(order) }, 0));
+        self.unsent[ORDERS].push_back((number, About::Request(id, count as u64)));
+        for id in (id.0..).take(count).map(StripId).chain(replaces) {
+            self.in_line.insert(id, number);
+        }
+    }
+
+    fn send_change(&mut self, action: Action, id: StripId, wish: Wish) {
+        let number = self.asked.len() as u64 + 1;
+        let (actor, reason) = (action.actor.clone(), action.reason.clone());
+        let change = item(&Up::Change { number, id, wish, actor, reason }, 0);
+        // What overtakes must not overtake what it is about.
+        let behind = self.in_line.get(&id).is_some_and(|&last| last >= self.end.arrived(ORDERS));
+        let class = if behind { ORDERS } else { CHANGES };
+        let item = self.end.push(class, change);
+        if behind {
+            self.in_line.insert(id, item);
+        }
+        self.unsent[class].push_back((item, About::Change(number)));
+        self.requests.asked(action.clone());
+        self.asked.push(Asked { action, uplinked: None, decided: None, answered: None, refusal: None });
+    }
+
+    /// A frame is heard.
+    pub fn hear(&mut self, now: Tick, bytes: &[u8]) {
+        let Ok(arrivals) = self.end.hear(now, bytes) else { return };
+        self.requests.wait_until(now);
+        for arrival in arrivals {
+            match message::<Down>(&arrival.item) {
+                Some(down) => self.learn(now, down),
+                None => self.misread += 1,
+            }
+        }
+    }
+
+    fn learn(&mut self, now: Tick, down: Down) {
+        match down {
+            Down::OnBoard { at, first, count } => {
+                let from = first.index().unwrap_or(usize::MAX);
+                for way in self.ways.iter_mut().skip(from).take(usize::try_from(count).unwrap_or(usize::MAX)) {
+                    (way.on_board, way.acknowledged) = (Some(at), Some(now));
+                }
+            }
+            Down::Answer { number, at, refusal } => {
+                let asked = usize::try_from(number).ok().and_then(|number| self.asked.get_mut(number.checked_sub(1)?));
+                if let Some(asked) = asked {
+                    (asked.decided, asked.answered, asked.refusal) = (Some(at), Some(now), refusal);
+                }
+            }
+            Down::Changed(change) => {
+                self.requests.adopt(&change);
+                let imaged = matches!(change.state, State::Completed | State::FulfilledByLink);
+                if let Some(way) = self.way_mut(change.id).filter(|way| imaged && way.imaged.is_none()) {
+                    (way.imaged, way.known) = (Some(change.tick), Some(now));
+                }
+            }
+            Down::Attempted(attempt) => self.requests.adopt_attempt(attempt),
+            Down::Housekeeping(housekeeping) => self.housekeeping = Some(housekeeping),
+            Down::Image { id, of, .. } => {
+                if let Some(way) = self.way_mut(id) {
+                    way.parts += 1;
+                    if way.parts == of {
+                        way.delivered = Some(now);
+                    }
+                }
+            }
+        }
+    }
+
+    fn way_mut(&mut self, id: StripId) -> Option<&mut Way> {
+        self.ways.get_mut(id.index()?)
+    }
+
+    /// Changes that were reported since the last call and that the life cycle does not have.
+    pub fn take_contradictions(&mut self) -> Vec<Contradiction> {
+        self.requests.take_contradictions()
+    }
+
+    /// What leaves at a tick at which the radio is open.
+    pub fn transmit(&mut self, now: Tick) -> Vec<Sent> {
+        let frames = self.end.transmit(now);
+        for class in [CHANGES, ORDERS] {
+            let sent = self.end.sent(class);
+            while let Some((_, about)) = self.unsent[class].pop_front_if(|(number, _)| *number < sent) {
+                match about {
+                    About::Request(first, count) => {
+                        for id in (first.0..).map(StripId).take(count as usize) {
+                            if let Some(way) = self.way_mut(id) {
+                                way.uplinked = Some(now);
+                            }
+                        }
+                    }
+                    About::Change(number) => {
+                        if let Some(asked) = self.asked.get_mut(number as usize - 1) {
+                            asked.uplinked = Some(now);
+                        }
+                    }
+                }
+            }
+        }
+        frames
+    }
+
+    /// The radio closes.
+    pub fn close(&mut self) {
+        self.end.close();
+    }
+
+    /// Each request with its way, in the order of their numbers.
+    pub fn lines(&self) -> impl Iterator<Item = WayLine> {
+        (1..).map(StripId).zip(&self.ways).filter_map(|(id, way)| {
+            let request = self.requests.request(id)?;
+            Some(WayLine {
+                strip: id.0,
+                name: request.order.name.clone(),
+                state: request.state.name(),
+                queued_tick: way.queued,
+                uplinked_tick: way.uplinked,
+                on_board_tick: way.on_board,
+                acknowledged_tick: way.acknowledged,
+                imaged_tick: way.imaged,
+                known_tick: way.known,
+                delivered_tick: way.delivered,
+            })
+        })
+    }
+}
+
+/// One line of `strips.jsonl`: a request and its way over the radio, as the ground knows it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WayLine {
+    /// Number of the strip.
+    pub strip: u64,
+    /// Its name.
+    pub name: String,
+    /// Its state.
+    pub state: &'static str,
+    /// See [`Way`].
+    pub queued_tick: Tick,
+    /// See [`Way`].
+    pub uplinked_tick: Option<Tick>,
+    /// See [`Way`].
+    pub on_board_tick: Option<Tick>,
+    /// See [`Way`].
+    pub acknowledged_tick: Option<Tick>,
+    /// See [`Way`].
+    pub imaged_tick: Option<Tick>,
+    /// See [`Way`].
+    pub known_tick: Option<Tick>,
+    /// See [`Way`].
+    pub delivered_tick: Option<Tick>,
+}

@@ -1,0 +1,7 @@
+//! Messages that more than one node reads or writes: checked coming in, infallible going out.
+
+pub mod decision_point;
+pub mod numbers;
+pub mod spacecraft_state;
+pub mod strip;
+pub mod task_result;
