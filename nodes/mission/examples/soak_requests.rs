@@ -114,15 +114,15 @@ fn seeds() -> Result<Vec<(&'static str, bool, Source)>> {
 
 /// A GeoPackage of what is read of it alone, so that changes meet that.
 fn small_package(bytes: &[u8]) -> Result<Vec<u8>> {
-    let mut database = rusqlite::Connection::open_in_memory()?;
-    database.deserialize_read_exact(rusqlite::MAIN_DB, bytes, bytes.len(), false)?;
+    let mut database = swath_gpkg::rusqlite::Connection::open_in_memory()?;
+    database.deserialize_read_exact(swath_gpkg::rusqlite::MAIN_DB, bytes, bytes.len(), false)?;
     let unread = "SELECT name FROM sqlite_master WHERE type = 'table' AND (name LIKE 'gpkg_%' OR name LIKE 'rtree_%') \
                   AND name NOT IN ('gpkg_geometry_columns', 'gpkg_spatial_ref_sys')";
     let names: Vec<String> =
-        database.prepare(unread)?.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+        database.prepare(unread)?.query_map([], |row| row.get(0))?.collect::<swath_gpkg::rusqlite::Result<_>>()?;
     let triggers = "SELECT name FROM sqlite_master WHERE type = 'trigger'";
     let triggers: Vec<String> =
-        database.prepare(triggers)?.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+        database.prepare(triggers)?.query_map([], |row| row.get(0))?.collect::<swath_gpkg::rusqlite::Result<_>>()?;
     database.execute_batch("PRAGMA foreign_keys = OFF")?;
     for trigger in triggers {
         database.execute_batch(&format!("DROP TRIGGER \"{trigger}\""))?;
@@ -131,7 +131,7 @@ fn small_package(bytes: &[u8]) -> Result<Vec<u8>> {
         database.execute_batch(&format!("DROP TABLE \"{name}\""))?;
     }
     database.execute_batch("UPDATE gpkg_spatial_ref_sys SET definition = ''; VACUUM")?;
-    Ok(database.serialize(rusqlite::MAIN_DB)?.to_vec())
+    Ok(database.serialize(swath_gpkg::rusqlite::MAIN_DB)?.to_vec())
 }
 
 /// The same file with one to four changes, in it or in what lies beside it.

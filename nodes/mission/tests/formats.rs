@@ -98,9 +98,9 @@ fn one_bad_record_costs_itself() {
 fn other_reference_systems_are_refused_by_name_in_every_format() {
     let error = damaged("lines.gpkg", |it| {
         // The table's reference system becomes another one that the file knows.
-        let database = rusqlite::Connection::open(path("lines.gpkg")).unwrap();
-        let mut copy = rusqlite::Connection::open_in_memory().unwrap();
-        rusqlite::backup::Backup::new(&database, &mut copy).unwrap().step(-1).unwrap();
+        let database = swath_gpkg::rusqlite::Connection::open(path("lines.gpkg")).unwrap();
+        let mut copy = swath_gpkg::rusqlite::Connection::open_in_memory().unwrap();
+        swath_gpkg::rusqlite::backup::Backup::new(&database, &mut copy).unwrap().step(-1).unwrap();
         copy.execute_batch("UPDATE gpkg_geometry_columns SET srs_id = -1").unwrap();
         it.bytes = copy.serialize("main").unwrap().to_vec();
     });
