@@ -123,7 +123,7 @@ def live():
     late.subscribe(["/swath/planner/status"])
     saw["late"] = late.hear(10, lambda: "/swath/planner/status" in late.messages)
     client.subscribe([it for it in client.channels if "/strips/" not in it])
-    wanted = ["/swath/spacecraft/state", "/swath/spacecraft/sub_satellite_point", "/tf", "/swath/guidance/status"]
+    wanted = ["/swath/spacecraft/state", "/swath/spacecraft/sub_satellite_point", "/tf", "/swath/guidance/status", "/clock"]
     client.hear(30, lambda: all(topic in client.messages for topic in wanted))
     states = [client.decode(wanted[0], it) for _, it in client.messages[wanted[0]][:50]]
     saw["ticks"] = [state.tick for state in states]

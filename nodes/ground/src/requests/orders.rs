@@ -101,12 +101,13 @@ impl Whole {
 
     /// Share of its worth that is imaged [1].
     fn imaged(&self) -> f64 {
-        self.parts.values().filter(|(state, ..)| is_imaged(*state)).map(|(_, share, _)| share).sum()
+        // The sum of nothing is -0.
+        self.parts.values().filter(|(state, ..)| is_imaged(*state)).map(|(_, share, _)| share).sum::<f64>() + 0.0
     }
 
     /// Sum of the priorities of the strips that are known [1].
     fn worth(&self) -> f64 {
-        self.parts.values().map(|(_, _, priority)| priority).sum()
+        self.parts.values().map(|(_, _, priority)| priority).sum::<f64>() + 0.0
     }
 
     /// Its priority: what imaging all of it is worth [1].

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result};
 use swath_mission::time_text;
@@ -22,7 +21,7 @@ const ATTITUDE_DEGREE: usize = 1;
 /// # Errors
 /// When it cannot be written.
 pub fn write_oem(recorded: &Recorded, track: &Track, folder: &Path) -> Result<()> {
-    let mut text = head("OEM", "2.0", recorded);
+    let mut text = head("OEM", "2.0", recorded, track);
     let degree = degree(ORBIT_DEGREE, track);
     text += &meta(&[
         names(recorded),
@@ -43,7 +42,7 @@ pub fn write_oem(recorded: &Recorded, track: &Track, folder: &Path) -> Result<()
 /// # Errors
 /// When it cannot be written.
 pub fn write_aem(recorded: &Recorded, track: &Track, folder: &Path) -> Result<()> {
-    let mut text = head("AEM", "1.0", recorded);
+    let mut text = head("AEM", "1.0", recorded, track);
     let word = |key, value: &str| (key, value.to_owned());
     text += &meta(&[
         names(recorded),
@@ -64,9 +63,9 @@ pub fn write_aem(recorded: &Recorded, track: &Track, folder: &Path) -> Result<()
 
 type Lines = Vec<(&'static str, String)>;
 
-fn head(kind: &str, version: &str, recorded: &Recorded) -> String {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let created = time_text::date(now).replace(' ', "T");
+/// The date of creation is the mission's end: what is made of a recording is the same whenever it is made.
+fn head(kind: &str, version: &str, recorded: &Recorded, track: &Track) -> String {
+    let created = track.points.last().map_or_else(String::new, |it| time(recorded, it));
     let name = &recorded.mission.name;
     format!(
         "CCSDS_{kind}_VERS = {version}\nCOMMENT simulated mission {name}\nCREATION_DATE = {created}\n\
