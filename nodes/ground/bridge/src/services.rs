@@ -31,6 +31,10 @@ pub fn all(node: &Node) -> Result<Vec<Service>> {
         offer(node, &graph::GET_LIMITS)?,
         offer(node, &graph::SET_PLANNER_MODE)?,
         offer(node, &graph::REVIEW_PROPOSAL)?,
+        offer(node, &graph::ACKNOWLEDGE_ALARM)?,
+        offer(node, &graph::SHELVE_ALARM)?,
+        offer(node, &graph::UNSHELVE_ALARM)?,
+        offer(node, &graph::LIST_ALARMS)?,
     ])
 }
 
