@@ -277,14 +277,18 @@ def kill(name):
 
 
 def node_dies(page, other):
-    """The request manager is killed: both tabs see that it came back, and what was asked for is kept."""
+    """The request manager is killed: both tabs see that it came back and are told, and what was asked for is kept."""
     tab(page, "alarms")
     tab(other, "alarms")
     kill("swath-requests")
     again = lambda it: it.to_contain_text("request_manager · 1 restart", timeout=60_000)
     again(expect(page.locator(".nodes")))
     seen("restart", other.locator(".nodes"), again)
+    seen("alarm", other.locator(".alarms tbody"), lambda it: it.to_contain_text("request_manager", timeout=60_000))
     picture(page, "alarms")
+    page.get_by_role("button", name="acknowledge all").click()
+    counter = other.locator("header.top button.pill")
+    seen("acknowledge", counter, lambda it: it.to_have_text("0 alarms", timeout=SOON))
     find(page, "drawn by hand")
     expect(state(page)).to_have_text("completed", timeout=SOON)
 

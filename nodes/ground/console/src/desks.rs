@@ -38,6 +38,10 @@ pub struct Desks {
     pub mode: Client<msg::SetPlannerMode>,
     /// Decides on proposals.
     pub decide: Client<msg::ReviewProposal>,
+    /// Says that alarms have been seen.
+    pub acknowledge: Client<msg::AcknowledgeAlarm>,
+    /// Puts alarms aside.
+    pub shelve: Client<msg::ShelveAlarm>,
 }
 
 impl Desks {
@@ -58,6 +62,8 @@ impl Desks {
             preview: node.client(&graph::PREVIEW_STRIP)?,
             mode: node.client(&graph::SET_PLANNER_MODE)?,
             decide: node.client(&graph::REVIEW_PROPOSAL)?,
+            acknowledge: node.client(&graph::ACKNOWLEDGE_ALARM)?,
+            shelve: node.client(&graph::SHELVE_ALARM)?,
         })
     }
 }

@@ -218,10 +218,15 @@ pub enum Fact {
         alarm: u64,
         /// Who raised it, and its name.
         name: String,
-        /// A level of `DiagnosticStatus`.
+        /// 1 warning, 2 error, 3 critical.
         level: u8,
         /// What it says.
         text: String,
+    },
+    /// What was wrong is no more.
+    Returned {
+        /// Number of the alarm.
+        alarm: u64,
     },
     /// An operator has seen an alarm.
     Acknowledged {
@@ -452,6 +457,12 @@ pub fn summary(it: &msg::RequestSummary) -> Fact {
         it.fulfilled_by_link,
     ];
     Fact::Summary { counts, reward: it.reward }
+}
+
+/// An operator has seen an alarm.
+#[must_use]
+pub fn acknowledged(alarm: u64, actor: &str) -> Fact {
+    Fact::Acknowledged { alarm, actor: actor.to_owned() }
 }
 
 /// An alarm.

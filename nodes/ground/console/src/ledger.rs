@@ -23,8 +23,15 @@ pub struct Ledger {
     clock: TickClock,
     /// The last state that was told of each request, with its time.
     told: BTreeMap<u64, (u8, Time)>,
+    /// Numbers of alarms by who raises them with their name, and by their text where that tells them apart.
     alarms: BTreeMap<(String, String), u64>,
     acknowledged: BTreeSet<u64>,
+    /// Whether the mission keeps its alarms itself; what nodes say on `/diagnostics` are its alarms then.
+    kept: bool,
+    /// Who put an alarm aside, and why, by its number.
+    aside: BTreeMap<u64, (String, String)>,
+    /// Until when an alarm was told to be put aside [ms], by its number.
+    until: BTreeMap<u64, f64>,
     present: Option<Fact>,
     /// How each request stands.
     requests: BTreeMap<u64, msg::StripStatus>,
@@ -79,6 +86,9 @@ impl Default for Ledger {
             told: BTreeMap::new(),
             alarms: BTreeMap::new(),
             acknowledged: BTreeSet::new(),
+            kept: false,
+            aside: BTreeMap::new(),
+            until: BTreeMap::new(),
             present: None,
             requests: BTreeMap::new(),
             tasks: 0,
@@ -269,15 +279,87 @@ impl Ledger {
         self.tell_at(&summary.header.stamp, &facts::summary(summary));
     }
 
-    /// Alarms. The same one raised again after it was acknowledged stands again.
+    /// Alarms of a mission that nobody keeps. The same one raised again after it was acknowledged stands again.
     pub fn diagnostics(&mut self, array: &DiagnosticArray) {
+        if self.kept {
+            return;
+        }
         for status in array.status.iter().filter(|status| status.level != DiagnosticStatus::OK) {
-            let next = self.alarms.len() as u64 + 1;
-            let key = (status.name.clone(), status.message.clone());
-            let number = *self.alarms.entry(key).or_insert(next);
+            let number = self.number(status.name.clone(), status.message.clone());
             self.acknowledged.remove(&number);
             self.tell_at(&array.header.stamp, &facts::alarm(number, status));
         }
+    }
+
+    fn number(&mut self, name: String, text: String) -> u64 {
+        let next = self.alarms.len() as u64 + 1;
+        *self.alarms.entry((name, text)).or_insert(next)
+    }
+
+    /// The alarms that stand, as the mission keeps them: those that were not told of yet, and until when which are put
+    /// aside.
+    pub fn standing(&mut self, standing: &msg::StandingAlarms) {
+        use msg::Alarm;
+        self.kept = true;
+        for alarm in &standing.alarms {
+            let name = format!("{}: {}", alarm.node, alarm.name);
+            let known = self.alarms.contains_key(&(name.clone(), String::new()));
+            let number = self.number(name.clone(), String::new());
+            if !known {
+                let (level, text) = (alarm.severity, alarm.text.clone());
+                self.tell_at(&alarm.raised, &Fact::Alarm { alarm: number, name, level, text });
+                match if alarm.state == Alarm::STATE_SHELVED { alarm.beneath } else { alarm.state } {
+                    Alarm::STATE_ACKNOWLEDGED => self.tell(self.now_ms, &facts::acknowledged(number, "")),
+                    Alarm::STATE_RETURNED_UNACKNOWLEDGED => self.tell(self.now_ms, &Fact::Returned { alarm: number }),
+                    _ => {}
+                }
+            }
+            let until_ms = milliseconds(&alarm.shelved_until);
+            if alarm.state == Alarm::STATE_SHELVED && self.until.insert(number, until_ms) != Some(until_ms) {
+                self.tell_aside(number, until_ms);
+            }
+        }
+    }
+
+    fn tell_aside(&mut self, alarm: u64, until_ms: f64) {
+        let (actor, reason) = self.aside.get(&alarm).cloned().unwrap_or_default();
+        self.tell(self.now_ms, &Fact::Shelved { alarm, until_ms, actor, reason });
+    }
+
+    /// What has happened to an alarm that the mission keeps.
+    pub fn alarm_event(&mut self, event: &msg::AlarmEvent) {
+        use msg::AlarmEvent as Event;
+        self.kept = true;
+        let name = format!("{}: {}", event.node, event.name);
+        let alarm = self.number(name.clone(), String::new());
+        let (actor, text) = (event.actor.clone(), event.text.clone());
+        let fact = match event.event {
+            Event::EVENT_RAISED => Fact::Alarm { alarm, name, level: event.severity, text },
+            Event::EVENT_RETURNED => Fact::Returned { alarm },
+            Event::EVENT_ACKNOWLEDGED => facts::acknowledged(alarm, &actor),
+            Event::EVENT_SHELVED => {
+                self.aside.insert(alarm, (actor, text));
+                // Until when is told by the alarms that stand, before or after this.
+                if let Some(until_ms) = self.until.get(&alarm).copied() {
+                    self.tell_aside(alarm, until_ms);
+                }
+                return;
+            }
+            Event::EVENT_UNSHELVED => {
+                self.until.remove(&alarm);
+                Fact::Shelved { alarm, until_ms: 0.0, actor, reason: text }
+            }
+            _ => return,
+        };
+        self.tell_at(&event.header.stamp, &fact);
+    }
+
+    /// Node and name of an alarm that the mission keeps, by its number here.
+    #[must_use]
+    pub fn kept_alarm(&self, alarm: u64) -> Option<(String, String)> {
+        let (name, _) = self.alarms.iter().find(|(_, number)| **number == alarm)?.0;
+        let (node, name) = name.split_once(": ")?;
+        self.kept.then(|| (node.to_owned(), name.to_owned()))
     }
 
     /// An operator has seen an alarm; whether it stood.
@@ -286,7 +368,7 @@ impl Ledger {
         if !known || !self.acknowledged.insert(alarm) {
             return false;
         }
-        self.tell(self.now_ms, &Fact::Acknowledged { alarm, actor: actor.to_owned() });
+        self.tell(self.now_ms, &facts::acknowledged(alarm, actor));
         true
     }
 
@@ -427,6 +509,37 @@ mod tests {
         let numbers: Vec<_> = told(&ledger).iter().map(|fact| (fact["kind"].clone(), fact["alarm"].clone())).collect();
         let expected = [("alarm", 1), ("alarm", 2), ("acknowledged", 1), ("alarm", 1), ("acknowledged", 1)];
         assert_eq!(numbers, expected.map(|(kind, alarm)| (json!(kind), json!(alarm))));
+    }
+
+    #[test]
+    fn alarms_that_the_mission_keeps_are_told_as_it_keeps_them() {
+        let mut ledger = Ledger::default();
+        let standing = |state, until| {
+            let (node, name) = ("guidance".to_owned(), "late".to_owned());
+            let alarm = msg::Alarm { node, name, severity: 2, state, shelved_until: at(until), ..Default::default() };
+            msg::StandingAlarms { alarms: vec![alarm], ..Default::default() }
+        };
+        let event = |event, actor: &str| {
+            let (node, name, actor) = ("guidance".to_owned(), "late".to_owned(), actor.to_owned());
+            msg::AlarmEvent { node, name, event, actor, text: "known".to_owned(), ..Default::default() }
+        };
+        // Who comes late hears what stands first; what nodes say is no alarm of its own then.
+        ledger.standing(&standing(msg::Alarm::STATE_ACKNOWLEDGED, 0));
+        let status = DiagnosticStatus { level: DiagnosticStatus::WARN, ..Default::default() };
+        ledger.diagnostics(&DiagnosticArray { status: vec![status], ..Default::default() });
+        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_RETURNED, "guidance"));
+        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_RAISED, "guidance"));
+        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_SHELVED, "ada"));
+        ledger.standing(&standing(msg::Alarm::STATE_SHELVED, 60));
+        ledger.standing(&standing(msg::Alarm::STATE_SHELVED, 60));
+        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_UNSHELVED, "ada"));
+        assert_eq!(ledger.kept_alarm(1), Some(("guidance".to_owned(), "late".to_owned())));
+        assert_eq!(ledger.kept_alarm(2), None);
+        let all = told(&ledger);
+        let kinds: Vec<_> = all.iter().map(|fact| fact["kind"].as_str().unwrap()).collect();
+        assert_eq!(kinds, ["alarm", "acknowledged", "returned", "alarm", "shelved", "shelved"]);
+        assert_eq!((&all[4]["actor"], &all[4]["until_ms"]), (&json!("ada"), &json!(ms(60))));
+        assert_eq!(all[5]["until_ms"], json!(0.0));
     }
 
     #[test]

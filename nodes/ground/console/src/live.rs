@@ -31,6 +31,8 @@ pub struct Ear {
     decisions: Subscription<msg::Decision>,
     planner: Subscription<msg::PlannerStatus>,
     summaries: Subscription<msg::RequestSummary>,
+    standing: Subscription<msg::StandingAlarms>,
+    alarm_events: Subscription<msg::AlarmEvent>,
     diagnostics: Subscription<DiagnosticArray>,
     looked: Option<Instant>,
 }
@@ -52,6 +54,8 @@ impl Ear {
             decisions: node.subscription(&graph::PLANNER_DECISION)?,
             planner: node.subscription(&graph::PLANNER_STATUS)?,
             summaries: node.subscription(&graph::REQUEST_SUMMARY)?,
+            standing: node.subscription(&graph::STANDING_ALARMS)?,
+            alarm_events: node.subscription(&graph::ALARM_EVENTS)?,
             diagnostics: node.subscription(&graph::DIAGNOSTICS)?,
             looked: None,
         })
@@ -73,6 +77,8 @@ impl Ear {
             drain(&self.results, |it| ledger.result(&it))?;
             drain(&self.planner, |it| ledger.planner(&it))?;
             drain(&self.summaries, |it| ledger.summary(&it))?;
+            drain(&self.alarm_events, |it| ledger.alarm_event(&it))?;
+            drain(&self.standing, |it| ledger.standing(&it))?;
             drain(&self.diagnostics, |it| ledger.diagnostics(&it))
         })?;
         if self.looked.is_none_or(|looked| looked.elapsed() >= LOOK) {

@@ -75,6 +75,8 @@ fn readers(bag: &Bag, namespace: &str) -> Result<Vec<Option<Reader>>> {
             _ if is(graph::PLANNER_DECISION.entry) => reader(topic, Ledger::choice)?,
             _ if is(graph::PLANNER_STATUS.entry) => reader(topic, Ledger::planner)?,
             _ if is(graph::REQUEST_SUMMARY.entry) => reader(topic, Ledger::summary)?,
+            _ if is(graph::STANDING_ALARMS.entry) => reader(topic, Ledger::standing)?,
+            _ if is(graph::ALARM_EVENTS.entry) => reader(topic, Ledger::alarm_event)?,
             _ if is(graph::DIAGNOSTICS.entry) => reader(topic, Ledger::diagnostics)?,
             _ => return Ok(None),
         }))

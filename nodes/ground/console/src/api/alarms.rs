@@ -5,11 +5,13 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::extract::State;
 use serde::{Deserialize, Serialize};
+use swath_msgs::swath_msgs as msg;
 use utoipa::ToSchema;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::answers::DOOR;
+use crate::desks::call;
 use crate::extract::Json;
 use crate::guard::Caller;
 use crate::problem::Problem;
@@ -34,7 +36,7 @@ struct Aside {
     /// Their numbers.
     ids: Vec<u64>,
     /// For how long, in simulated time [min].
-    #[schema(minimum = 1, maximum = 100_000)]
+    #[schema(minimum = 1, maximum = 43_200)]
     minutes: u32,
     /// Why.
     #[serde(default)]
@@ -48,8 +50,8 @@ struct Count {
     count: usize,
 }
 
-/// Longest time for which alarms are put aside [min], and longest reason [characters].
-const MINUTES_MAX: u32 = 100_000;
+/// Longest time for which alarms are put aside [min], thirty days, and longest reason [characters].
+const MINUTES_MAX: u32 = 43_200;
 const REASON_MAX: usize = 1000;
 
 /// Says that alarms have been seen, in every browser.
@@ -60,10 +62,18 @@ async fn acknowledge(
     Extension(caller): Extension<Caller>,
     Json(seen): Json<Seen>,
 ) -> Result<Json<Count>, Problem> {
-    server.counter()?;
-    let actor = caller.actor(DOOR);
-    let count =
-        server.site.shared.update(|ledger| seen.ids.iter().filter(|id| ledger.acknowledge(**id, &actor)).count());
+    let (counter, actor) = (server.counter()?, caller.actor(DOOR));
+    let mut count = 0;
+    for id in seen.ids {
+        let Some((node, name)) = server.site.shared.read(|ledger| ledger.kept_alarm(id)) else {
+            count += usize::from(server.site.shared.update(|ledger| ledger.acknowledge(id, &actor)));
+            continue;
+        };
+        let request = msg::AcknowledgeAlarmRequest { node, name, actor: actor.clone(), comment: String::new() };
+        // Said twice, the second time is refused.
+        let answer = counter.ask(move |desks| call(&desks.acknowledge, &request)).await?;
+        count += usize::from(answer.accepted);
+    }
     Ok(Json(Count { count }))
 }
 
@@ -75,14 +85,22 @@ async fn shelve(
     Extension(caller): Extension<Caller>,
     Json(aside): Json<Aside>,
 ) -> Result<Json<Count>, Problem> {
-    server.counter()?;
+    let counter = server.counter()?;
     if !(1..=MINUTES_MAX).contains(&aside.minutes) || aside.reason.chars().count() > REASON_MAX {
         return Err(Problem::bad(format!("minutes must be 1 to {MINUTES_MAX}, reason up to {REASON_MAX} characters")));
     }
     let (actor, minutes) = (caller.actor(DOOR), aside.minutes);
-    let count = server
-        .site
-        .shared
-        .update(|ledger| aside.ids.iter().filter(|id| ledger.shelve(**id, minutes, &actor, &aside.reason)).count());
+    let mut count = 0;
+    for id in aside.ids {
+        let Some((node, name)) = server.site.shared.read(|ledger| ledger.kept_alarm(id)) else {
+            let put = server.site.shared.update(|ledger| ledger.shelve(id, minutes, &actor, &aside.reason));
+            count += usize::from(put);
+            continue;
+        };
+        let (duration_s, comment) = (f64::from(minutes) * 60.0, aside.reason.clone());
+        let request = msg::ShelveAlarmRequest { node, name, duration_s, actor: actor.clone(), comment };
+        let answer = counter.ask(move |desks| call(&desks.shelve, &request)).await?;
+        count += usize::from(answer.accepted);
+    }
     Ok(Json(Count { count }))
 }

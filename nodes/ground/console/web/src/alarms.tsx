@@ -47,7 +47,7 @@ function Actions({ open }: { open: number[] }) {
     <div class="actions">
       <button disabled={!open.length} onClick={() => acknowledge(open)}>acknowledge all {open.length || ""}</button>
       <span class="space" />
-      <label>put aside for <input type="number" min={1} max={100000} value={minutes.value} onInput={(event) => (minutes.value = Number(event.currentTarget.value))} /> min</label>
+      <label>put aside for <input type="number" min={1} max={43200} value={minutes.value} onInput={(event) => (minutes.value = Number(event.currentTarget.value))} /> min</label>
       <input placeholder="because" aria-label="why it is put aside" value={reason.value} onInput={(event) => (reason.value = event.currentTarget.value)} />
     </div>
   );
@@ -59,11 +59,12 @@ function Line({ alarm, stands, t }: { alarm: Alarm; stands: boolean; t: number }
   return (
     <tr class={stands ? "" : "quiet"}>
       <td class="number">{stamp(alarm.t)}</td>
-      <td><span class={stands ? (severe ? "pill bad" : "pill warn") : "pill"}>{severe ? "error" : "warning"}</span></td>
+      <td><span class={stands ? (severe ? "pill bad" : "pill warn") : "pill"}>{alarm.level > 2 ? "critical" : severe ? "error" : "warning"}</span></td>
       <td>{alarm.name}</td>
       <td>
         {alarm.text}{alarm.count > 1 && <span class="dim"> · {alarm.count} times</span>}
-        {alarm.acknowledged && <span class="dim"> · seen by {alarm.by}</span>}
+        {alarm.returned && <span class="dim"> · no longer so</span>}
+        {alarm.acknowledged && <span class="dim"> · seen{alarm.by && ` by ${alarm.by}`}</span>}
         {aside && <span class="dim"> · put aside until {clock(aside.until_ms)} by {aside.actor}{aside.reason && `: ${aside.reason}`}</span>}
       </td>
       <td class="buttons">

@@ -144,6 +144,11 @@ export interface AlarmFact extends Head {
   text: string;
 }
 
+export interface ReturnedFact extends Head {
+  kind: "returned";
+  alarm: number;
+}
+
 export interface AcknowledgedFact extends Head {
   kind: "acknowledged";
   alarm: number;
@@ -181,6 +186,7 @@ export type Fact =
   | PlannerFact
   | SummaryFact
   | AlarmFact
+  | ReturnedFact
   | AcknowledgedFact
   | ShelvedFact
   | NodesFact;

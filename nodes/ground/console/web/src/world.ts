@@ -21,6 +21,8 @@ export interface Task {
 
 export interface Alarm extends f.AlarmFact {
   acknowledged: boolean;
+  /** Whether what was wrong is no more. */
+  returned: boolean;
   count: number;
   /** Who has seen it. */
   by: string;
@@ -127,10 +129,16 @@ export class World {
           ...this.alarms.get(fact.alarm),
           ...fact,
           acknowledged: false,
+          returned: false,
           by: "",
           count: (this.alarms.get(fact.alarm)?.count ?? 0) + 1,
         });
         break;
+      case "returned": {
+        const alarm = this.alarms.get(fact.alarm);
+        if (alarm) alarm.returned = true;
+        break;
+      }
       case "acknowledged": {
         const alarm = this.alarms.get(fact.alarm);
         if (alarm) Object.assign(alarm, { acknowledged: true, by: fact.actor });
