@@ -124,7 +124,8 @@ def live():
     saw["late"] = late.hear(10, lambda: "/swath/planner/status" in late.messages)
     client.subscribe([it for it in client.channels if "/strips/" not in it])
     wanted = ["/swath/spacecraft/state", "/swath/spacecraft/sub_satellite_point", "/tf", "/swath/guidance/status", "/clock"]
-    client.hear(30, lambda: all(topic in client.messages for topic in wanted))
+    # A mission may only just have begun.
+    client.hear(60, lambda: all(len(client.messages.get(topic, [])) > 2 for topic in wanted))
     states = [client.decode(wanted[0], it) for _, it in client.messages[wanted[0]][:50]]
     saw["ticks"] = [state.tick for state in states]
     saw["frames"] = sorted({it.child_frame_id for it in client.last("/tf").transforms})
