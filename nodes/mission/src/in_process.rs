@@ -12,6 +12,7 @@ use swath_sim::vehicle::flight::Flight;
 use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
+use crate::absences::{Absences, Presence};
 use crate::alarms::Board;
 use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, report_all};
 use crate::faults::grammar::Process;
@@ -264,10 +265,8 @@ impl Planner for Nobody {
 struct Troubles {
     /// When guidance is lost, and when another one is there.
     guidance: VecDeque<(Tick, Tick)>,
-    /// The same of the planner.
-    planner: VecDeque<(Tick, Tick)>,
-    /// The same of the request manager.
-    requests: VecDeque<(Tick, Tick)>,
+    planner: Absences,
+    requests: Absences,
     /// How long the attitude is held when nobody decides [ticks].
     hold: u32,
     noisy: bool,
@@ -277,7 +276,7 @@ impl Troubles {
     fn new(mission: &Mission, period: TickPeriod) -> Self {
         let of = |process| {
             let all = mission.faults.of(process, period).into_iter();
-            all.map(|(it, _)| (it.from, it.until)).collect::<VecDeque<_>>()
+            Absences::new(all.map(|(it, _)| (it.from, it.until)))
         };
         let guidance = mission.faults.of(Process::Guidance, period).iter().map(|(it, _)| (it.from, back(it))).collect();
         Self {
@@ -292,17 +291,14 @@ impl Troubles {
     /// How long the attitude is held at `now` because there is no planner [ticks]; one that comes back knows nothing of
     /// what was before.
     fn hold(&mut self, now: Tick, planner: &mut dyn Planner) -> Option<u32> {
-        while let Some(&(from, until)) = self.planner.front() {
-            if now < from {
-                return None;
+        match self.planner.at(now) {
+            Presence::Here => None,
+            Presence::Back => {
+                planner.forget();
+                None
             }
-            if now < until {
-                return Some(self.hold.min(until.since(now) as u32));
-            }
-            self.planner.pop_front();
-            planner.forget();
+            Presence::Away(until) => Some(self.hold.min(until.since(now) as u32)),
         }
-        None
     }
 }
 

@@ -11,6 +11,7 @@ use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
+use crate::absences::{Absences, Presence};
 use crate::file::{Mission, MissionError};
 use crate::link::apart::Apart;
 use crate::link::catalogue::Catalogue;
@@ -25,8 +26,7 @@ use crate::requests::refusal::Refusal;
 #[derive(Clone, Debug)]
 pub(crate) struct Desk {
     pub requests: RequestLogic,
-    /// When it is lost and when it is back, in order; the last one may be under way.
-    away: VecDeque<(Tick, Tick)>,
+    absences: Absences,
     /// What another one is made of.
     origin: (InitialState, Tick),
     /// What is still to come, in order.
@@ -42,19 +42,11 @@ impl Desk {
             }
         }
     }
-}
 
-impl Desk {
     /// Whether nobody is at the desk; who comes back to it knows what was written down.
-    fn away(&mut self, now: Tick) -> bool {
-        while let Some(&(from, until)) = self.away.front() {
-            if now < from {
-                return false;
-            }
-            if now < until {
-                return true;
-            }
-            self.away.pop_front();
+    fn is_left(&mut self, now: Tick) -> bool {
+        let presence = self.absences.at(now);
+        if presence == Presence::Back {
             let (initial, horizon) = &self.origin;
             match self.requests.restarted(initial, *horizon) {
                 Ok(fresh) => self.requests = fresh,
@@ -62,13 +54,13 @@ impl Desk {
                 Err(refusal) => tracing::error!("the request manager cannot be made again: {refusal}"),
             }
         }
-        false
+        matches!(presence, Presence::Away(_))
     }
 }
 
 impl RequestKeeper for Desk {
     fn offer(&mut self, task: u64, situation: &Situation, candidates: &mut Vec<Candidate>) {
-        if self.away(situation.now) {
+        if self.is_left(situation.now) {
             // The planner goes on with what it was offered, as far as that can still be imaged.
             let open = |it: &Candidate| {
                 it.window.close >= situation.now && self.requests.state(it.id).is_some_and(|state| !state.is_final())
@@ -125,7 +117,7 @@ impl Keeper {
         model: &Model,
         initial: Vec<Order>,
         actions: Vec<Action>,
-        away: VecDeque<(Tick, Tick)>,
+        absences: Absences,
     ) -> Result<Self, MissionError> {
         let origin = (mission.initial(), mission.horizon(model));
         let mut requests = RequestLogic::new(model.clone(), &origin.0, origin.1, mission.rules());
@@ -134,7 +126,7 @@ impl Keeper {
                 // Why one is refused is in the request manager's counts.
                 _ = requests.submit(order, Tick(0));
             }
-            let mut desk = Desk { requests, away, origin, to_come: actions.into(), refused: Vec::new() };
+            let mut desk = Desk { requests, absences, origin, to_come: actions.into(), refused: Vec::new() };
             desk.take_while(|action| action.initial);
             return Ok(Self::Together(Box::new(desk)));
         };
@@ -147,7 +139,7 @@ impl Keeper {
         }
         let space = Catalogue::new(requests, down, radio.config(), model.period);
         let mut apart = Apart::new(ground, space, radio, origin);
-        apart.will_be_asked(actions, away);
+        apart.will_be_asked(actions, absences);
         Ok(Self::Apart(Box::new(apart)))
     }
 }

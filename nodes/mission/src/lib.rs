@@ -1,7 +1,8 @@
-//! What a mission is, without ROS: its file, orders, the life cycle of requests, approval, planners that are guarded,
+//! What a mission is, without ROS: its file, orders, the life cycle of requests, approval, planners with a fallback,
 //! and whole missions in one process.
 #![expect(non_snake_case, reason = "frame letters")]
 
+mod absences;
 pub mod alarms;
 pub mod approval;
 pub mod fallback;

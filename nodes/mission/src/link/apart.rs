@@ -12,6 +12,7 @@ use swath_sim::vehicle::initial::InitialState;
 use super::catalogue::Catalogue;
 use super::ground::Ground;
 use super::radio::{Direction, Radio};
+use crate::absences::{Absences, Presence};
 use crate::orders::action::Action;
 use crate::requests::journal::InFlight;
 use crate::requests::refusal::Refusal;
@@ -35,8 +36,8 @@ pub struct Apart {
     /// What is still to be asked of the ground, in order.
     to_come: VecDeque<Action>,
     refused: Vec<(Action, Refusal)>,
-    /// When the ground is lost and when it is back, in order; the last one may be under way.
-    away: VecDeque<(Tick, Tick)>,
+    /// When the ground is lost.
+    absences: Absences,
     /// What another ground is made of.
     origin: (InitialState, Tick),
 }
@@ -55,15 +56,15 @@ impl Apart {
             finished: None,
             to_come: VecDeque::new(),
             refused: Vec::new(),
-            away: VecDeque::new(),
+            absences: Absences::default(),
             origin,
         }
     }
 
     /// What is asked of the ground on the way, in order, and when the ground is lost and back.
-    pub fn will_be_asked(&mut self, actions: Vec<Action>, away: VecDeque<(Tick, Tick)>) {
+    pub fn will_be_asked(&mut self, actions: Vec<Action>, absences: Absences) {
         self.to_come.extend(actions);
-        self.away = away;
+        self.absences = absences;
     }
 
     /// The ground.
@@ -108,7 +109,7 @@ impl Apart {
             self.space.hear(tick, &bytes);
         }
         let frames = arrived(&mut self.down, tick);
-        if self.ground_is_away(tick) {
+        if self.ground_is_left(tick) {
             return;
         }
         for bytes in frames {
@@ -130,7 +131,7 @@ impl Apart {
             self.space.close();
         }
         if open {
-            if !self.ground_is_away(tick) {
+            if !self.ground_is_left(tick) {
                 put(&mut self.up, self.radio.carry(Direction::Up, tick, self.ground.transmit(tick)));
             }
             put(&mut self.down, self.radio.carry(Direction::Down, tick, self.space.transmit(tick)));
@@ -141,15 +142,9 @@ impl Apart {
     }
 
     /// Whether nobody is on the ground; who comes back to it knows what was kept.
-    fn ground_is_away(&mut self, now: Tick) -> bool {
-        while let Some(&(from, until)) = self.away.front() {
-            if now < from {
-                return false;
-            }
-            if now < until {
-                return true;
-            }
-            self.away.pop_front();
+    fn ground_is_left(&mut self, now: Tick) -> bool {
+        let presence = self.absences.at(now);
+        if presence == Presence::Back {
             let (initial, horizon) = &self.origin;
             match self.ground.restarted(initial, *horizon) {
                 Ok(fresh) => self.ground = fresh,
@@ -157,7 +152,7 @@ impl Apart {
                 Err(refusal) => tracing::error!("the ground cannot be made again: {refusal}"),
             }
         }
-        false
+        matches!(presence, Presence::Away(_))
     }
 
     /// All that happens before a tick.
