@@ -8,6 +8,8 @@
 #[path = "common/flight.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod flight;
+#[path = "common/soak.rs"]
+mod soak;
 #[path = "../tests/it/storm.rs"]
 mod storm;
 #[path = "../ros/tests/it/stranger.rs"]
@@ -17,7 +19,7 @@ mod stranger;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 use flight::Flight;
 use serde_json::{Value, json};
 use storm::Storm;
@@ -29,18 +31,7 @@ const KINDS: [(&str, &str, &str); 2] = [("lockstep", "12", "0"), ("paced", "1.5"
 const DATAGRAMS: u64 = 5000;
 
 fn main() -> Result<()> {
-    let args: Vec<String> = std::env::args().skip(1).collect();
-    let args: Vec<&str> = args.iter().map(String::as_str).collect();
-    let result = match args[..] {
-        ["--plan"] => json!({ "seeds": 20, "chunk": 1 }),
-        [first, count] => {
-            let first: u64 = first.parse()?;
-            measure(first..first + count.parse::<u64>()?)?
-        }
-        _ => bail!("usage: soak_datagrams --plan | FIRST COUNT"),
-    };
-    println!("{result}");
-    Ok(())
+    soak::run(20, measure)
 }
 
 fn measure(seeds: std::ops::Range<u64>) -> Result<Value> {

@@ -9,13 +9,15 @@
 
 #[path = "common/flight.rs"]
 mod flight;
+#[path = "common/soak.rs"]
+mod soak;
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use flight::{Flight, python, signal};
 use serde_json::{Value, json};
 
@@ -26,18 +28,7 @@ const KINDS: [(&str, &str, &str); 2] = [("lockstep", "20", "0"), ("paced", "2", 
 const STATES: &str = "/swath/spacecraft/state";
 
 fn main() -> Result<()> {
-    let args: Vec<String> = std::env::args().skip(1).collect();
-    let args: Vec<&str> = args.iter().map(String::as_str).collect();
-    let result = match args[..] {
-        ["--plan"] => json!({ "seeds": 5, "chunk": 1 }),
-        [first, count] => {
-            let first: u64 = first.parse()?;
-            measure(first..first + count.parse::<u64>()?)?
-        }
-        _ => bail!("usage: soak_guests --plan | FIRST COUNT"),
-    };
-    println!("{result}");
-    Ok(())
+    soak::run(5, measure)
 }
 
 fn measure(seeds: std::ops::Range<u64>) -> Result<Value> {

@@ -105,6 +105,18 @@ fn foxglove_plays_a_bag() {
 }
 
 #[test]
+fn the_bridge_listens_in_its_namespace_however_that_is_said() {
+    for words in [&["--namespace", "/sat2"][..], &["--ros-args", "-r", "__ns:=/sat2"]] {
+        let bridge = Bridge::start(&common::domain(), words);
+        assert!(bridge.1.starts_with("ws://127.0.0.1:"), "{}", bridge.1);
+        let topics = bridge.saw("topics");
+        let topics = strings(&topics);
+        assert!(topics.contains(&"/sat2/spacecraft/state") && topics.contains(&"/sat2/clock"), "{topics:?}");
+        assert!(!topics.iter().any(|it| it.starts_with("/swath/")), "{topics:?}");
+    }
+}
+
+#[test]
 fn what_others_could_reach_commands_nothing() {
     let words = ["bridge", "--listen", "0.0.0.0:0", "--services"];
     let error = common::fail(&mut common::swath(&common::domain(), &words));

@@ -1,4 +1,4 @@
-"""A client of the bridge: python foxglove.py URL live|commands|bag; prints what it saw as JSON.
+"""A client of the bridge: python foxglove.py URL topics|live|commands|bag; prints what it saw as JSON.
 
 It speaks Foxglove's WebSocket protocol (foxglove.sdk.v1) and decodes with mcap-ros2-support.
 """
@@ -104,6 +104,13 @@ def strips(client):
     client.subscribe(topics)
     client.hear(10, lambda: all(topic in client.messages for topic in topics))
     return {topic.rsplit("/", 1)[1]: len(client.last(topic)["features"]) for topic in topics}
+
+
+def topics():
+    """Names of the channels that there are without a mission."""
+    client = Client()
+    client.hear(20, lambda: len(client.channels) >= 24)
+    return sorted(client.channels)
 
 
 def live():
@@ -221,4 +228,4 @@ def bag():
     return saw
 
 
-print(json.dumps({"live": live, "commands": commands, "bag": bag}[WAY]()))
+print(json.dumps({"topics": topics, "live": live, "commands": commands, "bag": bag}[WAY]()))

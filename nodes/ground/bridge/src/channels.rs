@@ -55,6 +55,7 @@ impl Channels {
     /// None yet, for the nodes of a namespace.
     #[must_use]
     pub fn new(context: &Arc<Context>, kept: Arc<Kept>, namespace: &str) -> Self {
+        let namespace = namespace.trim_end_matches('/');
         Self {
             context: Arc::clone(context),
             open: Vec::new(),

@@ -11,7 +11,8 @@ use clap::Args;
 use foxglove::websocket::Capability;
 use foxglove::{Context, WebSocketServer, WebSocketServerHandle};
 use swath_bags::{Bag, TopicPattern};
-use swath_ros::{RosArgs, graph};
+use swath_ros::{Node, RosArgs, graph};
+use tokio::runtime::{Builder, Runtime};
 
 use crate::channels::Channels;
 use crate::latched::Kept;
@@ -58,9 +59,8 @@ pub fn run(args: &BridgeArgs, ros: &RosArgs) -> Result<()> {
          address of this machine, such as 127.0.0.1, and `ssh -L`",
         args.listen
     );
-    let namespace = args.namespace.clone().unwrap_or_else(|| graph::NAMESPACE.to_owned());
     let topics = TopicPattern::new(&[], args.topics.as_deref(), None)?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
+    let runtime = Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("foxglove")
         .enable_all()
@@ -71,22 +71,19 @@ pub fn run(args: &BridgeArgs, ros: &RosArgs) -> Result<()> {
     let (wishes, heard) = channel();
     let listener = Arc::new(Listener::new(Arc::clone(&kept), wishes));
     let server = server(args, &context).listener(listener);
-    let channels = Channels::new(&context, kept, namespace.trim_end_matches('/'));
+    let start = |server: WebSocketServer| start(&runtime, server, args.listen);
     let Some(path) = &args.bag else {
-        let ros = ros.clone().in_namespace(&namespace);
+        let ros = args.namespace.as_ref().map_or_else(|| ros.clone(), |it| ros.clone().in_namespace(it));
+        let node = Node::start(graph::BRIDGE, &ros)?;
+        let channels = Channels::new(&context, kept, node.names().namespace());
         let allowed = live::Allowed { services: args.services, publish: args.publish };
-        return live::run(
-            |services| start(&runtime, server.services(services)),
-            channels,
-            &heard,
-            topics,
-            &ros,
-            allowed,
-        );
+        return live::run(node, |services| start(server.services(services)), channels, &heard, topics, allowed);
     };
+    let namespace = args.namespace.as_deref().unwrap_or(graph::NAMESPACE);
+    let channels = Channels::new(&context, kept, namespace);
     let bag = Bag::open(path)?;
     let (first, last) = bag.time_range().with_context(|| format!("{} holds no messages", path.display()))?;
-    let handle = start(&runtime, server.playback_time_range(first, last))?;
+    let handle = start(server.playback_time_range(first, last))?;
     playback::run(&bag, channels, &handle, &heard, topics)
 }
 
@@ -108,10 +105,10 @@ fn server(args: &BridgeArgs, context: &Arc<Context>) -> WebSocketServer {
 }
 
 /// Starts the server and says where it is.
-fn start(runtime: &tokio::runtime::Runtime, server: WebSocketServer) -> Result<WebSocketServerHandle> {
-    let handle = runtime.block_on(server.start()).context("cannot listen")?;
+fn start(runtime: &Runtime, server: WebSocketServer, listen: SocketAddr) -> Result<WebSocketServerHandle> {
+    let handle = runtime.block_on(server.start()).with_context(|| format!("cannot listen on {listen}"))?;
     let mut stdout = std::io::stdout().lock();
-    writeln!(stdout, "ws://127.0.0.1:{}", handle.port())?;
+    writeln!(stdout, "ws://{}", SocketAddr::new(listen.ip(), handle.port()))?;
     stdout.flush()?;
     Ok(handle)
 }

@@ -9,7 +9,7 @@ use foxglove::websocket::service::Service;
 use swath_bags::TopicPattern;
 use swath_bags::tap::{Selection, Tap};
 use swath_msgs::swath_msgs::ListStripsRequest;
-use swath_ros::{Node, RosArgs, Shutdown, graph};
+use swath_ros::{Node, Shutdown, graph};
 
 use crate::channels::Channels;
 use crate::listener::Wish;
@@ -43,14 +43,13 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 /// # Errors
 /// When the server cannot start, or DDS fails.
 pub fn run(
+    node: Node,
     start: impl FnOnce(Vec<Service>) -> Result<WebSocketServerHandle>,
     mut channels: Channels,
     wishes: &Receiver<Wish>,
     topics: TopicPattern,
-    ros: &RosArgs,
     allowed: Allowed,
 ) -> Result<()> {
-    let node = Node::start(graph::BRIDGE, ros)?;
     let shutdown = Shutdown::on_signals(node.signal())?;
     let offered = if allowed.services { services::all(&node)? } else { Vec::new() };
     let list = node.client(&graph::LIST_STRIPS)?;

@@ -10,6 +10,9 @@ use swath_ros::{Cdr, Node, RawPublisher, graph};
 
 use crate::listener::Wish;
 
+/// Publishers at a time.
+const PUBLISHERS: usize = 200;
+
 /// Publishers, each of one client's channel.
 #[derive(Default)]
 pub struct Publishing {
@@ -20,6 +23,9 @@ impl Publishing {
     /// Follows a wish; what cannot be done is told to its client.
     pub fn follow(&mut self, node: &Node, wish: Wish) {
         match wish {
+            Wish::Advertise(client, channel) if self.open.len() >= PUBLISHERS => {
+                refuse(&client, &format!("{} cannot be published: {PUBLISHERS} publishers are open", channel.topic));
+            }
             Wish::Advertise(client, channel) => match advertise(node, &channel) {
                 Ok(publisher) => {
                     self.open.insert((client.id(), channel.id), publisher);
