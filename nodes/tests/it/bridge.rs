@@ -10,17 +10,6 @@ use swath_ros::graph;
 
 use crate::common;
 
-const MISSION: &str = r#"
-name = "bridge"
-seed = 11
-orbits = 60.0
-pace = 40.0
-planner = "lookahead"
-
-[requests.random]
-count = [80, 80]
-"#;
-
 /// A bridge at work, ended with the test, and where it is.
 struct Bridge(Child, String);
 
@@ -53,7 +42,7 @@ fn strings(value: &Value) -> Vec<&str> {
 #[test]
 fn foxglove_sees_a_flying_mission_and_commands_it_where_it_may() {
     let (folder, domain) = (tempfile::tempdir().unwrap(), common::domain());
-    let mission = common::write_mission(folder.path(), MISSION);
+    let mission = common::write_mission(folder.path(), common::QUIET);
     let mut launch = common::swath(&domain, &["launch", "--no-bag", "--out"]);
     let _flight = common::Running::start(launch.arg(folder.path().join("out")).arg(&mission));
 

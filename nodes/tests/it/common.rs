@@ -34,6 +34,22 @@ pub fn write_mission(folder: &Path, text: &str) -> PathBuf {
     path
 }
 
+/// A mission with little else to do than what it is asked for.
+pub const QUIET: &str = r#"
+name = "quiet"
+seed = 11
+orbits = 60.0
+pace = 40.0
+planner = "lookahead"
+
+[requests.random]
+count = [80, 80]
+
+[approval]
+deadline_s = 1800.0
+at_deadline = "skip"
+"#;
+
 /// Runs a command to its end.
 pub fn run(command: &mut Command) -> Output {
     command.output().unwrap()

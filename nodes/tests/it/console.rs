@@ -10,22 +10,6 @@ use swath_mission::time_text;
 
 use crate::common;
 
-/// A mission with little else to do than what it is asked for.
-const MISSION: &str = r#"
-name = "console-day"
-seed = 11
-orbits = 60.0
-pace = 40.0
-planner = "lookahead"
-
-[requests.random]
-count = [80, 80]
-
-[approval]
-deadline_s = 1800.0
-at_deadline = "skip"
-"#;
-
 fn address() -> String {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     listener.local_addr().unwrap().to_string()
@@ -75,7 +59,7 @@ impl Drop for Replay {
 #[test]
 fn an_operators_day_in_the_console_alone() {
     let (folder, domain, address) = (tempfile::tempdir().unwrap(), common::domain(), address());
-    let mission = common::write_mission(folder.path(), MISSION);
+    let mission = common::write_mission(folder.path(), common::QUIET);
     let out = folder.path().join("out");
     let mut launch = common::swath(&domain, &["launch", "--console", &address, "--out"]);
     let mut flight = common::Running::start(launch.arg(&out).arg(&mission));
