@@ -59,6 +59,17 @@ pub enum Step {
     GiveUp,
 }
 
+/// What a sign of life of a process means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// It goes on as before, or counts no more.
+    AsBefore,
+    /// It is the first one since its start.
+    First,
+    /// It was warned of.
+    AfterWarning,
+}
+
 /// Where a process stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -94,11 +105,15 @@ impl Watch {
         self.stage = Stage::Runs { sign: now, fresh: true, warned: false };
     }
 
-    /// It gives a sign of life. Returns whether it is the first since its start.
-    pub fn sign(&mut self, now: Duration) -> bool {
-        let Stage::Runs { fresh, .. } = self.stage else { return false };
+    /// It gives a sign of life.
+    pub fn sign(&mut self, now: Duration) -> Heard {
+        let Stage::Runs { fresh, warned, .. } = self.stage else { return Heard::AsBefore };
         self.stage = Stage::Runs { sign: now, fresh: false, warned: false };
-        fresh
+        match (fresh, warned) {
+            (true, _) => Heard::First,
+            (_, true) => Heard::AfterWarning,
+            _ => Heard::AsBefore,
+        }
     }
 
     /// It has ended.
@@ -172,8 +187,8 @@ mod tests {
 
     fn watch() -> Watch {
         let mut watch = Watch::new(SupervisionConfig::default(), ms(0));
-        assert!(watch.sign(ms(1000)));
-        assert!(!watch.sign(ms(1500)));
+        assert_eq!(watch.sign(ms(1000)), Heard::First);
+        assert_eq!(watch.sign(ms(1500)), Heard::AsBefore);
         watch
     }
 
@@ -183,12 +198,12 @@ mod tests {
         assert_eq!(watch.step(ms(3499)), Step::Nothing);
         assert_eq!(watch.step(ms(3500)), Step::Warn);
         assert_eq!(watch.step(ms(4000)), Step::Nothing);
-        watch.sign(ms(4100));
+        assert_eq!(watch.sign(ms(4100)), Heard::AfterWarning);
         assert_eq!(watch.step(ms(6100)), Step::Warn);
         assert_eq!(watch.step(ms(9099)), Step::Nothing);
         assert_eq!(watch.step(ms(9100)), Step::Kill);
         assert_eq!(watch.step(ms(20_000)), Step::Nothing, "it is killed once");
-        assert!(!watch.sign(ms(20_001)), "what it has said before counts no more");
+        assert_eq!(watch.sign(ms(20_001)), Heard::AsBefore, "what it has said before counts no more");
         assert_eq!(watch.lost(ms(20_002)), Step::Nothing);
         assert_eq!(watch.step(ms(20_202)), Step::Start);
     }

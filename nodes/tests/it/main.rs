@@ -11,6 +11,7 @@ mod common;
 mod console;
 mod datagrams;
 mod examples;
+mod fault_orders;
 #[path = "../../examples/common/flight.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod flight;

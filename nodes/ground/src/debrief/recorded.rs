@@ -11,6 +11,7 @@ use swath_bags::schema::{Schema, adapt};
 use swath_bags::{Bag, Filter, TopicPattern};
 use swath_msgs::RosMessage;
 use swath_msgs::swath_msgs as msg;
+use swath_node::fault_orders::ordered;
 use swath_node::messages::task_result::task_record;
 use swath_ros::{Cdr, decode, graph};
 use swath_sim::task::SettledTask;
@@ -107,6 +108,7 @@ impl Recorded {
             events: Vec::new(),
             complete: false,
         };
+        recorded.read_fault_orders()?;
         recorded.read_points()?;
         recorded.offers = recorded.by_task(&graph::UPCOMING_STRIPS, |offer| offer.task)?;
         recorded.decisions = recorded.by_task(&graph::PLANNER_DECISION, |decision| decision.task)?;
@@ -183,6 +185,20 @@ impl Recorded {
             Ok(())
         })?;
         Ok(by_task)
+    }
+
+    /// Faults that were ordered on the way befall the mission when it is flown again; without those that change no task.
+    fn read_fault_orders(&mut self) -> Result<()> {
+        let mut orders = Vec::new();
+        if self.has(&graph::FAULT_ORDERS) {
+            self.for_each(&graph::FAULT_ORDERS, |message| {
+                orders.extend(ordered(&message));
+                Ok(())
+            })?;
+        }
+        orders.iter().for_each(|order| _ = self.mission.faults.add(order.fault));
+        self.mission.faults = std::mem::take(&mut self.mission.faults).within_one_process();
+        Ok(())
     }
 
     fn read_points(&mut self) -> Result<()> {

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 use swath_ros::Sign;
 
 use swath_mission::outcome::NodeProcess;
-use swath_mission::supervision::{Step, SupervisionConfig, Watch};
+use swath_mission::supervision::{Heard, Step, SupervisionConfig, Watch};
 
 /// How long a process may take to end after it was asked to.
 const STOP_TIMEOUT: Duration = Duration::from_secs(20);
@@ -40,7 +40,14 @@ pub struct Event {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Happened {
     /// It gives no sign of life for so long.
-    Silent(Duration),
+    Silent {
+        /// How long.
+        time: Duration,
+        /// Whether that was ordered.
+        by_order: bool,
+    },
+    /// It gives signs of life again, after it was silent.
+    Heard,
     /// It has ended, as told in words, for the so-manieth time of late, and is started again.
     Lost {
         /// How.
@@ -208,7 +215,10 @@ impl Fleet {
             let name = member.name.clone();
             let mut tell = |what| events.push(Event { node: name.clone(), what });
             let now = self.began.elapsed();
-            let back = member.listen(now, &mut self.now_ns);
+            let (back, heard) = member.listen(now, &mut self.now_ns);
+            if heard {
+                tell(Happened::Heard);
+            }
             if back && std::mem::take(&mut member.lost) {
                 tell(Happened::Back { by_order: std::mem::take(&mut member.by_order) });
             }
@@ -235,7 +245,10 @@ impl Fleet {
                 }
             }
             match member.watch.step(now) {
-                Step::Warn => tell(Happened::Silent(Duration::from_secs_f64(self.config.warn_s))),
+                Step::Warn => tell(Happened::Silent {
+                    time: Duration::from_secs_f64(self.config.warn_s),
+                    by_order: member.by_order,
+                }),
                 Step::Kill => {
                     tracing::warn!("node {} gives no sign of life and is killed", member.name);
                     member.kill()?;
@@ -312,18 +325,16 @@ impl Member {
         Ok(running.child.try_wait()?)
     }
 
-    /// Takes in what it has said; returns whether it gives its first sign of life since its start.
-    fn listen(&mut self, now: Duration, now_ns: &mut u64) -> bool {
-        let Some(running) = &self.running else { return false };
+    /// Takes in what it has said; returns whether it gives its first sign of life since its start, and whether one came
+    /// after it was warned of.
+    fn listen(&mut self, now: Duration, now_ns: &mut u64) -> (bool, bool) {
+        let Some(running) = &self.running else { return (false, false) };
         let lines: Vec<String> = running.lines.try_iter().collect();
-        let mut first = false;
-        for line in lines {
-            first |= self.hear(&line, now, now_ns);
-        }
-        first
+        let heard: Vec<Heard> = lines.iter().map(|line| self.hear(line, now, now_ns)).collect();
+        (heard.contains(&Heard::First), heard.contains(&Heard::AfterWarning))
     }
 
-    fn hear(&mut self, line: &str, now: Duration, now_ns: &mut u64) -> bool {
+    fn hear(&mut self, line: &str, now: Duration, now_ns: &mut u64) -> Heard {
         match Sign::parse(line) {
             Some(Sign::Alive(theirs)) => {
                 *now_ns = theirs.max(*now_ns);
@@ -332,9 +343,9 @@ impl Member {
             Some(Sign::Struck(number)) => {
                 self.struck = number + 1;
                 self.by_order = true;
-                false
+                Heard::AsBefore
             }
-            None => false,
+            None => Heard::AsBefore,
         }
     }
 

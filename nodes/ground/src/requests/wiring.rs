@@ -141,6 +141,7 @@ impl RequestNode {
     fn turn(&mut self) -> Result<()> {
         let mut outgoing = Vec::new();
         while let Some(point) = self.points.take()? {
+            self.base.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
                 let _ = self.results.flush(FLUSH_TIMEOUT);
                 self.base.strike();

@@ -25,6 +25,8 @@ pub struct Report {
     pub tick: Tick,
     /// Which alarm.
     pub key: Key,
+    /// How grave it is, where the table does not say.
+    pub severity: Severity,
     /// Whether something is wrong.
     pub wrong: bool,
     /// What.
@@ -32,8 +34,10 @@ pub struct Report {
 }
 
 impl Report {
-    fn new(tick: Tick, node: &str, name: &str, wrong: bool, text: String) -> Self {
-        Self { tick, key: Key::new(node, name), wrong, text }
+    /// What a node reports of an alarm of the table.
+    #[must_use]
+    pub fn new(tick: Tick, node: &str, name: &str, wrong: bool, text: String) -> Self {
+        Self { tick, key: Key::new(node, name), severity: Severity::Error, wrong, text }
     }
 }
 
@@ -44,11 +48,11 @@ pub fn report_all(board: &mut Board, mut reports: Vec<Report>, wishes: &[Wish]) 
     let mut wishes = wishes.iter().peekable();
     // A wish was followed when it came; what it met may have come in another order then.
     let follow = |wish: &Wish, board: &mut Board| _ = wish.follow(board);
-    for Report { tick, key, wrong, text } in reports {
+    for Report { tick, key, severity, wrong, text } in reports {
         while let Some(wish) = wishes.next_if(|wish| wish.tick < tick) {
             follow(wish, board);
         }
-        board.report(tick, key, Severity::Error, wrong, &text);
+        board.report(tick, key, severity, wrong, &text);
     }
     wishes.for_each(|wish| follow(wish, board));
 }

@@ -67,11 +67,11 @@ pub enum FaultPlanError {
         for_s: f64,
     },
     /// It cannot be made to happen where the mission is flown.
-    #[error("{fault} cannot be flown {place}: {can}")]
+    #[error("{fault} cannot be {place}: {can}")]
     NotHere {
         /// The fault.
         fault: PlannedFault,
-        /// Where the mission is flown.
+        /// What it cannot be, and where.
         place: &'static str,
         /// What can fail there.
         can: &'static str,
@@ -132,7 +132,7 @@ impl FaultPlan {
     pub fn resolved(mut self, seed: u64, horizon: Tick, period: TickPeriod) -> Self {
         for fault in random::draw(seed, std::mem::take(&mut self.random), horizon, period) {
             self.plan.push(fault);
-            if check(&self.plan, Tick(0), horizon, period).is_err() {
+            if check(&self.plan, horizon, period).is_err() {
                 self.plan.pop();
             }
         }
@@ -144,7 +144,7 @@ impl FaultPlan {
     /// # Errors
     /// The first fault that cannot be flown.
     pub fn validate(&self, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
-        check(&self.plan, Tick(0), horizon, period)
+        check(&self.plan, horizon, period)
     }
 
     /// Checks that a mission in one process can fly the faults: there are no messages, stores and bags in it.
@@ -152,13 +152,15 @@ impl FaultPlan {
     /// # Errors
     /// The first that it cannot.
     pub fn fits_one_process(&self) -> Result<(), FaultPlanError> {
-        let flown = |fault: &PlannedFault| match fault.what {
-            What::Vehicle(_) => true,
-            What::Process(process, _) => Process::IN_PROCESS.contains(&process),
-            What::Drop(_) | What::StoreFull | What::BagFull => false,
-        };
         let can = "wheels, gyro, star tracker, guidance, planner and request_manager can fail there";
-        self.each(flown, "in one process", can)
+        self.each(in_one_process, "flown in one process", can)
+    }
+
+    /// Without the faults that no mission in one process can fly; over DDS they change no task.
+    #[must_use]
+    pub fn within_one_process(mut self) -> Self {
+        self.plan.retain(in_one_process);
+        self
     }
 
     /// Checks that a mission over DDS can fly the faults.
@@ -167,15 +169,14 @@ impl FaultPlan {
     /// The first that it cannot.
     pub fn fits_dds(&self) -> Result<(), FaultPlanError> {
         let flown = |fault: &PlannedFault| match fault.what {
-            What::Vehicle(_) => true,
             // What would have been offered and recorded meanwhile, nobody knows.
             What::Process(Process::RequestManager | Process::Recorder, _) => fault.for_s.is_none(),
-            What::Process(..) => true,
+            What::Vehicle(_) | What::Process(..) => true,
             What::Drop(_) | What::StoreFull | What::BagFull => false,
         };
         let can =
             "wheels, gyro, star tracker and nodes can fail there; request_manager and recorder are replaced at once";
-        self.each(flown, "over DDS", can)
+        self.each(flown, "flown over DDS", can)
     }
 
     fn each(
@@ -207,7 +208,7 @@ impl FaultPlan {
         }
         fault.at_s = fault.at_s.or(Some(now_s));
         self.plan.push(fault);
-        if let Err(error) = check(&self.plan, now, horizon, period) {
+        if let Err(error) = check(&self.plan, horizon, period) {
             self.plan.pop();
             return Err(error);
         }
@@ -243,11 +244,20 @@ impl FaultPlan {
     }
 }
 
-fn check(plan: &[PlannedFault], now: Tick, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
+/// Whether a mission in one process can fly a fault.
+fn in_one_process(fault: &PlannedFault) -> bool {
+    match fault.what {
+        What::Vehicle(_) => true,
+        What::Process(process, _) => Process::IN_PROCESS.contains(&process),
+        What::Drop(_) | What::StoreFull | What::BagFull => false,
+    }
+}
+
+fn check(plan: &[PlannedFault], horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
     if plan.len() > FAULTS_MAX {
         return Err(FaultPlanError::TooMany { count: plan.len() });
     }
-    let scheduled: Vec<_> = plan.iter().map(|fault| Scheduled::new(fault, now, period)).collect();
+    let scheduled: Vec<_> = plan.iter().map(|fault| Scheduled::new(fault, Tick(0), period)).collect();
     for (i, (&fault, it)) in plan.iter().zip(&scheduled).enumerate() {
         if let (What::Process(Process::Spacecraft, _), Some(for_s)) = (fault.what, fault.for_s) {
             return Err(FaultPlanError::OwnsTheClock { fault, for_s });

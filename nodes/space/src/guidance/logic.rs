@@ -223,10 +223,8 @@ impl GuidanceLogic {
     }
 
     /// What was ordered befalls it before it looks at the state at `tick`.
-    #[must_use]
-    pub fn struck_at(mut self, tick: Option<Tick>) -> Self {
+    pub fn set_struck_at(&mut self, tick: Option<Tick>) {
         self.strikes_at = tick;
-        self
     }
 
     /// Goes on where a guidance was that is lost: what it flew counts as interrupted.

@@ -106,7 +106,7 @@ impl PlannerNode {
             last: None,
             now: Tick(0),
             fault_told: None,
-            away: base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect(),
+            away: away(&base),
             base,
         })
     }
@@ -117,6 +117,9 @@ impl PlannerNode {
                 continue;
             }
             let tick = Tick(point.tick);
+            if self.base.take_fault_orders()? {
+                self.away = away(&self.base);
+            }
             if self.base.strikes_at().is_some_and(|at| tick >= at) {
                 let _ = self.decisions.flush(FLUSH_TIMEOUT);
                 self.base.strike();
@@ -224,6 +227,11 @@ impl PlannerNode {
         self.last = Some(task);
         Ok(())
     }
+}
+
+/// When there is no planner, by order.
+fn away(base: &MissionNode) -> Vec<Scheduled> {
+    base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect()
 }
 
 /// The mode that is asked for, else the one that operators set before this planner was started again, else the mission's.

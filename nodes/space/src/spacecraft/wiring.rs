@@ -12,8 +12,10 @@ use swath_sim::time::Tick;
 
 use super::journal::Journal;
 use super::logic::SpacecraftLogic;
+use super::orders::OrderDesk;
 use super::telemetry::{self, Telemetry};
 use swath_mission::alarms::conditions::back;
+use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::Process;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::node::{MissionNode, Severity};
@@ -57,10 +59,11 @@ struct SpacecraftNode {
     logic: SpacecraftLogic,
     clock: Publisher<Clock>,
     states: Publisher<SpacecraftState>,
-    /// There is one where the sensors are not exact.
-    truths: Option<Publisher<SpacecraftState>>,
+    /// Tells what the sensors do not, where they are not exact.
+    truths: Publisher<SpacecraftState>,
     commands: Subscription<WheelTorque>,
     telemetry: Telemetry,
+    orders: OrderDesk,
     unanswered: VecDeque<StateSample>,
     /// There is one where somebody would start the spacecraft again.
     journal: Option<Journal>,
@@ -71,7 +74,7 @@ struct SpacecraftNode {
 }
 
 impl SpacecraftNode {
-    fn new(base: MissionNode) -> Result<Self> {
+    fn new(mut base: MissionNode) -> Result<Self> {
         let parameters = base.node.parameters();
         let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
         let pace = parameters.declare(pace.in_range(0.0..=1e6).read_only())?;
@@ -82,22 +85,20 @@ impl SpacecraftNode {
         let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
         let telemetry = Telemetry::new(&base)?;
         parameters.check_given()?;
-        let lost = base.mission.faults.of(Process::Guidance, base.model.period);
-        let without = lost.iter().map(|(it, _)| (it.from, back(it))).collect();
-        let logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
-        let (journal, unanswered, logic) = take_up(&base, logic.without_guidance(without))?;
+        let orders = OrderDesk::new(&mut base)?;
+        let mut logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
+        logic.set_without_guidance(without_guidance(&base));
+        let (journal, unanswered, logic) = take_up(&base, logic)?;
         Ok(Self {
             logic,
             journal,
             unanswered,
             clock: base.node.publisher(&graph::CLOCK)?,
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
-            truths: match base.mission.tells_truth_apart(base.model.period) {
-                true => Some(base.node.publisher(&graph::SPACECRAFT_TRUTH)?),
-                false => None,
-            },
+            truths: base.node.publisher(&graph::SPACECRAFT_TRUTH)?,
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
             telemetry,
+            orders,
             pace,
             peers,
             peer_timeout: Duration::from_secs_f64(timeout),
@@ -131,6 +132,7 @@ impl SpacecraftNode {
         let mut progress = Instant::now();
         while !self.logic.done() && !self.base.shutdown.asked() {
             self.take_commands()?;
+            self.take_orders()?;
             let before = self.logic.now();
             while self.logic.ready() && !self.logic.done() {
                 self.advance()?;
@@ -157,6 +159,7 @@ impl SpacecraftNode {
         let mut latest = due.max(Instant::now() + COMMAND_PATIENCE);
         while !self.logic.done() && !self.base.shutdown.asked() {
             self.take_commands()?;
+            self.take_orders()?;
             let now = Instant::now();
             let wanted = if self.logic.ready() { due } else { latest };
             if now < wanted {
@@ -193,6 +196,19 @@ impl SpacecraftNode {
         Ok(())
     }
 
+    /// Takes the faults that are ordered; those of wheels and sensors befall it at their ticks.
+    fn take_orders(&mut self) -> Result<()> {
+        let before = self.base.mission.faults.plan.len();
+        if !self.orders.take(&mut self.base, self.logic.now())? {
+            return Ok(());
+        }
+        let new = self.base.mission.faults.plan.iter().skip(before).copied().collect();
+        let new = FaultPlan { plan: new, random: 0 };
+        self.logic.suffer(new.vehicle(self.base.model.period));
+        self.logic.set_without_guidance(without_guidance(&self.base));
+        Ok(())
+    }
+
     fn publish(&mut self, sample: &StateSample) -> Result<()> {
         self.base.set_now(sample.tick);
         self.clock.publish(&Clock { clock: self.base.stamper.time(sample.tick) })?;
@@ -205,8 +221,8 @@ impl SpacecraftNode {
     }
 
     fn tell(&self, sample: &StateSample) -> Result<()> {
-        if let (Some(truths), Some(body)) = (&self.truths, sample.truth) {
-            truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
+        if let Some(body) = sample.truth {
+            self.truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
         }
         Ok(self.states.publish(&spacecraft_state(&self.base.stamper, sample))?)
     }
@@ -216,7 +232,7 @@ impl SpacecraftNode {
         self.unanswered.iter().try_for_each(|sample| self.tell(sample))
     }
 
-    fn linger(&self) -> Result<()> {
+    fn linger(&mut self) -> Result<()> {
         let (states, clock) = (self.states.flush(FLUSH_TIMEOUT), self.clock.flush(FLUSH_TIMEOUT));
         if !(states && clock) {
             tracing::warn!("not every reader has the last state and time");
@@ -225,9 +241,16 @@ impl SpacecraftNode {
             self.base.wait(FLUSH_TIMEOUT)?;
             // The last state is the one that ends the mission: it must arrive.
             while self.commands.take()?.is_some() {}
+            self.take_orders()?;
         }
         Ok(())
     }
+}
+
+/// Between which states there is no guidance, by order.
+fn without_guidance(base: &MissionNode) -> Vec<(Tick, Tick)> {
+    let lost = base.mission.faults.of(Process::Guidance, base.model.period);
+    lost.iter().map(|(it, _)| (it.from, back(it))).collect()
 }
 
 /// The file of the commands that were flown.
