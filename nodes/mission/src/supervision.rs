@@ -118,18 +118,25 @@ impl Watch {
 
     /// It has ended.
     pub fn lost(&mut self, now: Duration) -> Step {
+        self.wait_after_loss(now);
+        if self.losses() > self.config.starts {
+            return self.give_up();
+        }
+        Step::Nothing
+    }
+
+    /// It has ended for want of something that may be there again at any time: it is started again however often.
+    pub fn wants(&mut self, now: Duration) {
+        self.wait_after_loss(now);
+    }
+
+    fn wait_after_loss(&mut self, now: Duration) {
         let seconds = Duration::from_secs_f64;
         let since = now.saturating_sub(seconds(self.config.within_s));
         self.losses.retain(|&loss| loss >= since);
         self.losses.push_back(now);
-        let count = self.losses.len() as u32;
-        if count > self.config.starts {
-            self.stage = Stage::GivenUp;
-            return Step::GiveUp;
-        }
-        let pause = (self.config.backoff_s * 2_f64.powi(count as i32 - 1)).min(self.config.backoff_max_s);
-        self.stage = Stage::Waits { until: now + seconds(pause) };
-        Step::Nothing
+        let doubled = self.config.backoff_s * 2_f64.powi(self.losses() as i32 - 1);
+        self.stage = Stage::Waits { until: now + seconds(doubled.min(self.config.backoff_max_s)) };
     }
 
     /// It is not started again.
@@ -233,6 +240,18 @@ mod tests {
         assert_eq!(watch.step(now + ms(100_000)), Step::Nothing);
         watch.pardon(now);
         assert_eq!(watch.step(now), Step::Start);
+    }
+
+    #[test]
+    fn one_that_wants_something_is_started_however_often() {
+        let mut watch = watch();
+        for loss in 0..100 {
+            let now = ms(2000 + loss * 1000);
+            watch.wants(now);
+            assert!(!watch.given_up());
+            assert_eq!(watch.step(now + ms(5000)), Step::Start, "loss {loss}");
+            watch.started(now);
+        }
     }
 
     #[test]

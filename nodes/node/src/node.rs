@@ -9,8 +9,9 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
+use swath_ros::{Dropping, Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
@@ -112,6 +113,14 @@ impl MissionNode {
     pub(crate) fn mind_own_faults(&mut self) {
         let ordered = self.process.map(|process| self.mission.faults.of(process, self.model.period));
         self.ordered = ordered.unwrap_or_default().into_iter().skip(self.struck as usize).collect();
+        let end_ns = |tick: Tick| if tick == FOR_GOOD { u64::MAX } else { self.stamper.nanoseconds(tick) };
+        let dropping = |(it, share): (Scheduled, f64)| Dropping {
+            from_ns: self.stamper.nanoseconds(it.from),
+            until_ns: end_ns(it.until),
+            share,
+        };
+        let drops = self.mission.faults.drops(self.model.period);
+        self.node.set_drops(self.mission.seed, drops.into_iter().map(dropping).collect());
     }
 
     /// A file in which this node keeps what it needs to go on when it is started again; nothing where nobody would.

@@ -49,6 +49,16 @@ pub const OPERATOR: &str = "operator";
 /// The nodes that fly a mission.
 pub const FLIGHT_NODES: [&str; 4] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER];
 
+/// Topics whose messages come again as long as they are not answered: of these some may be dropped by order.
+pub const COME_AGAIN: [Entry; 6] = [
+    SPACECRAFT_STATE.entry,
+    SPACECRAFT_TRUTH.entry,
+    WHEEL_TORQUE.entry,
+    DECISION_POINT.entry,
+    UPCOMING_STRIPS.entry,
+    PLANNER_TASK.entry,
+];
+
 /// The nodes that count only what other nodes of their mission say, and wait for nobody else.
 pub const MEMBERS: [&str; 5] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER, LAUNCHER];
 

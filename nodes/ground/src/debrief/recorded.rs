@@ -19,6 +19,7 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
+use swath_mission::faults::orders::Ordered;
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::action::{Act, Action};
 use swath_mission::orders::order::Order;
@@ -68,6 +69,8 @@ pub struct Recorded {
     pub decisions: BTreeMap<u64, msg::Decision>,
     /// Changes of strip requests, in order.
     pub events: Vec<msg::StripStatus>,
+    /// Faults that were ordered on the way, which the mission has too.
+    pub fault_orders: Vec<Ordered>,
     /// Whether the recording reaches the mission's end.
     pub complete: bool,
 }
@@ -106,6 +109,7 @@ impl Recorded {
             offers: BTreeMap::new(),
             decisions: BTreeMap::new(),
             events: Vec::new(),
+            fault_orders: Vec::new(),
             complete: false,
         };
         recorded.read_fault_orders()?;
@@ -129,7 +133,7 @@ impl Recorded {
     }
 
     /// Whether the bag has a topic.
-    fn has<M>(&self, topic: &graph::Topic<M>) -> bool {
+    pub fn has<M>(&self, topic: &graph::Topic<M>) -> bool {
         let name = self.name_of(topic);
         self.bag.topics().iter().any(|recorded| recorded.topic.name == name)
     }
@@ -187,17 +191,18 @@ impl Recorded {
         Ok(by_task)
     }
 
-    /// Faults that were ordered on the way befall the mission when it is flown again; without those that change no task.
+    /// Faults that were ordered on the way befall the mission when it is flown again. Each message tells of all before.
     fn read_fault_orders(&mut self) -> Result<()> {
-        let mut orders = Vec::new();
+        let mut orders: Vec<Ordered> = Vec::new();
         if self.has(&graph::FAULT_ORDERS) {
             self.for_each(&graph::FAULT_ORDERS, |message| {
-                orders.extend(ordered(&message));
+                let new = ordered(&message).into_iter().filter(|order| !orders.contains(order)).collect::<Vec<_>>();
+                orders.extend(new);
                 Ok(())
             })?;
         }
         orders.iter().for_each(|order| _ = self.mission.faults.add(order.fault));
-        self.mission.faults = std::mem::take(&mut self.mission.faults).within_one_process();
+        self.fault_orders = orders;
         Ok(())
     }
 

@@ -1,5 +1,7 @@
 //! What the launcher does about nodes that are lost, and about what is ordered to befall the mission.
 
+use std::time::{Duration, Instant};
+
 use anyhow::{Result, bail};
 use swath_msgs::swath_msgs as msg;
 use swath_node::fault_orders::ordered;
@@ -8,13 +10,15 @@ use swath_sim::time::Tick;
 
 use super::fleet::{Event, Fleet, Happened};
 use super::over_dds::Launcher;
-use swath_mission::alarms::conditions::{Report, of_plan};
+use swath_mission::alarms::conditions::{BAG_FULL, Report, of_plan};
 use swath_mission::fallback::fallback;
-use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::{Failure, Process};
+use swath_mission::faults::{FaultPlan, What};
 
 /// After so many losses of late another planner decides in the planner's place.
 const PLANNER_LOSSES: u32 = 3;
+/// A recorder that has been there for so long has room.
+const ROOM: Duration = Duration::from_secs(2);
 /// The alarm of a mission that goes on with less than it needs.
 const SAFE_MODE: &str = "safe mode";
 
@@ -30,6 +34,9 @@ impl Launcher {
         }
         let now = self.now(fleet);
         self.mind_safe_mode(now)?;
+        if self.room_since.take_if(|since| since.elapsed() >= ROOM).is_some() {
+            self.tell(now, BAG_FULL, false, "there is room");
+        }
         match self.recorder_faults.pop_front_if(|(it, _)| it.from <= now) {
             Some((_, Failure::Kill)) => fleet.kill(graph::RECORDER),
             Some((_, Failure::Hang)) => fleet.freeze(graph::RECORDER),
@@ -86,7 +93,17 @@ impl Launcher {
                     fleet.set_extra(&node, &[format!("planner:={}", fallback())]);
                 }
             }
-            Happened::Back { .. } => self.tell(tick, &lost, false, "it is there again"),
+            Happened::NoRoom => {
+                self.room_since = None;
+                // The recorder is ahead of what is heard of time here: the plan tells of all that it orders.
+                if self.faults.when(What::BagFull, self.model.period).is_empty() {
+                    self.tell(tick, BAG_FULL, true, "there is no room for it");
+                }
+            }
+            Happened::Back { .. } => {
+                self.tell(tick, &lost, false, "it is there again");
+                self.room_since = (node == graph::RECORDER).then(Instant::now).or(self.room_since);
+            }
             Happened::GivenUp { how } => {
                 self.tell(tick, &silent, false, "it is lost");
                 let reason = format!("{how}, as often before: it is not started again");

@@ -13,6 +13,7 @@ use swath_node::out;
 use swath_node::stamp::Stamper;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use super::fleet::Fleet;
@@ -22,9 +23,9 @@ use crate::alarms::FlyingBoard;
 use swath_mission::alarms::conditions::{Report, of_plan};
 use swath_mission::alarms::{Key, Severity};
 use swath_mission::fallback::{Deciders, Policies, made_instead};
-use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
+use swath_mission::faults::{FaultPlan, What};
 use swath_mission::file::Mission;
 use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
@@ -70,7 +71,8 @@ pub fn fly(
     let mut fleet = Fleet::new(&mission.supervision);
     let record = wishes.record;
     if record {
-        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, manifest_data)?;
+        let words = [manifest_data, full_bag(&launcher)].concat();
+        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words)?;
     }
     if let Some(address) = wishes.console {
         show(&mut fleet, &mission.name, &namespace, address)?;
@@ -134,11 +136,11 @@ fn start_recorder(
     mission_file: &Path,
     bag: &Path,
     namespace: &str,
-    manifest_data: Vec<String>,
+    further: Vec<String>,
 ) -> Result<()> {
     let (manifest, output) = (text(mission_file)?, text(bag)?);
     let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
-    let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
+    let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(further);
     let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(namespace)).collect();
     fleet.start(graph::RECORDER, "swath-bag", &words)?;
     fleet.wait_for_line(graph::RECORDER, START_TIMEOUT).map(drop)
@@ -154,6 +156,13 @@ fn manifest_data(mission: &Mission, namespace: &str, policies: &Policies) -> Vec
         Err(error) => entries.push(format!("policy_hash=none: {error}")),
     }
     entries.into_iter().flat_map(|entry| ["--manifest-data".to_owned(), entry]).collect()
+}
+
+/// When nothing can be stored in the bag, by order.
+fn full_bag(launcher: &Launcher) -> Vec<String> {
+    let ns = |tick: Tick| if tick == FOR_GOOD { u64::MAX } else { launcher.stamper.nanoseconds(tick) };
+    let words = |it: &Scheduled| ["--full-disk".to_owned(), format!("{}..{}", ns(it.from), ns(it.until))];
+    launcher.faults.when(What::BagFull, launcher.model.period).iter().flat_map(words).collect()
 }
 
 /// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
@@ -254,6 +263,8 @@ pub(super) struct Launcher {
     /// Why the mission is, or ended, in safe mode.
     pub(super) safe_mode: Option<String>,
     pub(super) planner_status: Subscription<msg::PlannerStatus>,
+    /// Since when a recorder is there that was lost.
+    pub(super) room_since: Option<Instant>,
     /// Whether the planner has held since the mission came into safe mode.
     pub(super) held: bool,
 }
@@ -296,6 +307,7 @@ impl Launcher {
             safe_mode: None,
             planner_status: node.subscription(&graph::PLANNER_STATUS)?,
             held: false,
+            room_since: None,
             model,
             node,
         })

@@ -18,6 +18,13 @@ const CATALOGUE: &str = "catalogue";
 /// Who tells of lost nodes.
 const LAUNCHER: &str = "launcher";
 
+/// The alarm of messages that are dropped.
+const MESSAGES_DROPPED: &str = "messages dropped";
+/// The alarm of a store that cannot be written.
+pub const STORE_FULL: &str = "store full";
+/// The alarm of a bag that cannot be written.
+pub const BAG_FULL: &str = "bag full";
+
 /// A node says whether something is wrong.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
@@ -112,7 +119,13 @@ pub fn back(lost: &Scheduled) -> Tick {
 }
 
 fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
-    let What::Process(process, failure) = it.what else { return None };
-    let text = if failure == Failure::Kill { "killed by order" } else { "hangs by order" };
-    Some((LAUNCHER, format!("{} lost", process.name()), text.to_owned()))
+    let alarm = |name: String, text: &str| Some((LAUNCHER, name, text.to_owned()));
+    match it.what {
+        What::Process(process, Failure::Kill) => alarm(format!("{} lost", process.name()), "killed by order"),
+        What::Process(process, Failure::Hang) => alarm(format!("{} lost", process.name()), "hangs by order"),
+        What::Drop(_) => alarm(MESSAGES_DROPPED.to_owned(), &format!("{} by order", it.what)),
+        What::StoreFull => alarm(STORE_FULL.to_owned(), "full by order"),
+        What::BagFull => alarm(BAG_FULL.to_owned(), "full by order"),
+        What::Vehicle(_) => None,
+    }
 }

@@ -137,6 +137,33 @@ pub const DEFINITIONS: &[Definition] = &[
             "look at the next passes (`swath passes`) and at the stations",
         ],
     ),
+    lasting(
+        "messages dropped",
+        Severity::Warn,
+        [
+            "messages between nodes are lost, by order",
+            "what is not answered is asked again; ticks of a paced mission may pass without a torque command",
+            "nothing, if it returns; plan no drill for the time of an important pass",
+        ],
+    ),
+    lasting(
+        "store full",
+        Severity::Error,
+        [
+            "there is no room where the requests are kept",
+            "no request is taken, changed or answered; what was acknowledged is kept, and the satellite flies on",
+            "make room: what waits is written as soon as there is some",
+        ],
+    ),
+    lasting(
+        "bag full",
+        Severity::Error,
+        [
+            "there is no room where the bag is written",
+            "nothing is recorded; the bag is whole up to there, and goes on in a new file once there is room",
+            "make room",
+        ],
+    ),
     moment(
         "planner late",
         Severity::Warn,

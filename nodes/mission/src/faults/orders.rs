@@ -53,7 +53,7 @@ impl FaultPlan {
             return Err(OrderError::Actor(actor.len()));
         }
         let fault: PlannedFault = text.parse()?;
-        Self { plan: vec![fault], random: 0 }.fits_dds()?;
+        Self { plan: vec![fault], random: 0 }.fits_orders()?;
         let scheduled = self.order(fault, now.after(1), horizon, period)?;
         let fault = PlannedFault { at_s: Some(fault.at_s.unwrap_or_else(|| period.time_s(scheduled.from))), ..fault };
         Ok((Ordered { tick: now, actor: actor.to_owned(), fault }, scheduled))
@@ -90,6 +90,7 @@ mod tests {
             ("guidance:kill@1000s", "comes too late: the mission ends at 1000 s"),
             ("wheel1:dead@250s", "wheel1:weak 50%@200.5s+100s and wheel1:dead@250s contradict"),
             ("wheel2:weak 10%", "wheel2:dead@600s and wheel2:weak 10%@200.5s contradict"),
+            ("bag:full+5s", "bag:full+5s cannot be ordered while a mission flies"),
             ("request_manager:hang+5s", "request_manager:hang+5s cannot be flown over DDS"),
         ] {
             let error = order(text).unwrap_err().to_string();

@@ -275,6 +275,15 @@ impl GuidanceLogic {
             }
             return Vec::new();
         }
+        // Two states may be under way: if the first one was lost, it comes again, and this one after it.
+        let next = match (&self.latest, &self.before) {
+            (Some(latest), _) => latest.tick.after(1),
+            (None, None) => Tick(0),
+            (None, Some(_)) => state.tick,
+        };
+        if state.tick == next.after(1) {
+            return Vec::new();
+        }
         self.process(state)
     }
 

@@ -23,6 +23,10 @@ use swath_node::program::{PACE, Program};
 
 /// How long a question without an answer waits before it is asked again.
 const ASK_AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// The same where messages are dropped by order.
+const ASK_SOON_AFTER: Duration = Duration::from_millis(50);
+/// A question is asked at least so often before its deadline.
+const TIMES_ASKED: u32 = 5;
 /// Share of a tick's wall-clock time that planning may take in a paced mission.
 const PACED_SHARE: f64 = 0.8;
 /// How long, instead of the mission's deadline, a task is waited for whose planner may be started again on the way.
@@ -72,6 +76,7 @@ struct GuidanceNode {
     status_every: u64,
     pace: f64,
     deadline: Duration,
+    ask_again_after: Duration,
     question: Option<Question>,
     /// When there is no planner, by order.
     nobody_plans: Vec<Scheduled>,
@@ -115,6 +120,7 @@ impl GuidanceNode {
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             pace,
             deadline: Duration::ZERO,
+            ask_again_after: ASK_AGAIN_AFTER,
             question: None,
             nobody_plans: Vec::new(),
             kept: None,
@@ -138,6 +144,8 @@ impl GuidanceNode {
             self.base.mission.planning_deadline_s
         });
         self.deadline = if restarts && self.pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
+        let patience = if faults.drops(period).is_empty() { ASK_AGAIN_AFTER } else { ASK_SOON_AFTER };
+        self.ask_again_after = patience.min(self.deadline / TIMES_ASKED);
         self.logic.set_struck_at(self.base.strikes_at());
     }
 
@@ -219,6 +227,7 @@ impl GuidanceNode {
 
     /// Asks again, or holds the attitude when the answer is late; returns how long there is nothing to do.
     fn mind_question(&mut self) -> Result<Duration> {
+        let again = self.ask_again_after;
         let Some(question) = &mut self.question else { return Ok(ASK_AGAIN_AFTER) };
         if self.logic.wanted() != Some(question.message.task) {
             self.question = None;
@@ -226,11 +235,11 @@ impl GuidanceNode {
         }
         let (task, waited) = (question.message.task, question.asked.elapsed());
         if let Some(left) = self.deadline.checked_sub(waited) {
-            if question.last_asked.elapsed() >= ASK_AGAIN_AFTER {
+            if question.last_asked.elapsed() >= again {
                 question.last_asked = Instant::now();
                 self.points.publish(&question.message)?;
             }
-            return Ok(left.min(ASK_AGAIN_AFTER));
+            return Ok(left.min(again));
         }
         let hold = self.base.mission.hold_s;
         let text =

@@ -112,14 +112,13 @@ impl PlannerNode {
     }
 
     fn turn(&mut self) -> Result<()> {
+        self.take_fault_orders()?;
         while let Some(point) = self.points.take()? {
             if point.mission_over {
                 continue;
             }
             let tick = Tick(point.tick);
-            if self.base.take_fault_orders()? {
-                self.away = away(&self.base);
-            }
+            self.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| tick >= at) {
                 let _ = self.decisions.flush(FLUSH_TIMEOUT);
                 self.base.strike();
@@ -157,6 +156,13 @@ impl PlannerNode {
         self.take_orders()?;
         self.tell_status()?;
         self.base.wait(IDLE)?;
+        Ok(())
+    }
+
+    fn take_fault_orders(&mut self) -> Result<()> {
+        if self.base.take_fault_orders()? {
+            self.away = away(&self.base);
+        }
         Ok(())
     }
 

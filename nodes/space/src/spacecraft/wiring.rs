@@ -24,6 +24,8 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 /// In lockstep, states without an answer for so long are sent again.
 const RESEND_AFTER: Duration = Duration::from_millis(300);
+/// The same where messages are dropped by order, and in a paced mission.
+const RESEND_SOON_AFTER: Duration = Duration::from_millis(20);
 /// How long the last messages may take to reach their readers.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// In a paced mission, how long a late command is waited for where ticks are shorter than that.
@@ -64,6 +66,7 @@ struct SpacecraftNode {
     commands: Subscription<WheelTorque>,
     telemetry: Telemetry,
     orders: OrderDesk,
+    resend_after: Duration,
     unanswered: VecDeque<StateSample>,
     /// There is one where somebody would start the spacecraft again.
     journal: Option<Journal>,
@@ -99,6 +102,7 @@ impl SpacecraftNode {
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
             telemetry,
             orders,
+            resend_after: resend_after(&base),
             pace,
             peers,
             peer_timeout: Duration::from_secs_f64(timeout),
@@ -139,12 +143,12 @@ impl SpacecraftNode {
             }
             if self.logic.now() > before {
                 progress = Instant::now();
-            } else if progress.elapsed() > RESEND_AFTER {
+            } else if progress.elapsed() > self.resend_after {
                 self.resend()?;
                 progress = Instant::now();
             }
             if !self.logic.ready() {
-                self.base.wait(RESEND_AFTER)?;
+                self.base.wait(self.resend_after)?;
             }
         }
         Ok(())
@@ -157,15 +161,22 @@ impl SpacecraftNode {
         let tick = Duration::from_secs_f64(self.base.model.period.seconds() / self.pace);
         let mut due = Instant::now() + tick;
         let mut latest = due.max(Instant::now() + COMMAND_PATIENCE);
+        let mut told = Instant::now();
         while !self.logic.done() && !self.base.shutdown.asked() {
             self.take_commands()?;
             self.take_orders()?;
             let now = Instant::now();
             let wanted = if self.logic.ready() { due } else { latest };
             if now < wanted {
-                self.base.wait(wanted - now)?;
+                if !self.logic.ready() && told.elapsed() >= RESEND_SOON_AFTER {
+                    self.resend()?;
+                    told = Instant::now();
+                }
+                let left = wanted - now;
+                self.base.wait(if self.logic.ready() { left } else { left.min(RESEND_SOON_AFTER) })?;
                 continue;
             }
+            told = now;
             due += tick;
             latest = due.max(now + COMMAND_PATIENCE);
             self.advance()?;
@@ -206,6 +217,7 @@ impl SpacecraftNode {
         let new = FaultPlan { plan: new, random: 0 };
         self.logic.suffer(new.vehicle(self.base.model.period));
         self.logic.set_without_guidance(without_guidance(&self.base));
+        self.resend_after = resend_after(&self.base);
         Ok(())
     }
 
@@ -245,6 +257,12 @@ impl SpacecraftNode {
         }
         Ok(())
     }
+}
+
+/// In lockstep, after how long without an answer states are sent again.
+fn resend_after(base: &MissionNode) -> Duration {
+    let dropped = !base.mission.faults.drops(base.model.period).is_empty();
+    if dropped { RESEND_SOON_AFTER } else { RESEND_AFTER }
 }
 
 /// Between which states there is no guidance, by order.
