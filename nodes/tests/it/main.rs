@@ -10,6 +10,7 @@ mod clients;
 mod common;
 mod console;
 mod datagrams;
+mod described;
 mod examples;
 #[path = "../../examples/common/flight.rs"]
 #[allow(dead_code, reason = "others use more of it")]
