@@ -12,6 +12,7 @@ mod common;
 mod console;
 mod datagrams;
 mod drill;
+mod described;
 mod examples;
 mod fault_orders;
 #[path = "../../examples/common/flight.rs"]
