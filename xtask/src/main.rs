@@ -42,8 +42,9 @@ usage: cargo xtask COMMAND
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
-  web              test and build the console's page with npm, from its sources into
-                   the files that the program holds
+  web [--picture]  test and build the console's page with npm, from its sources into
+                   the files that the program holds; with --picture, take the
+                   README's picture of it instead: a test flies the mission
   ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
                    in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
   soak python      run the Python package's long examples; they fetch gigabytes
@@ -198,10 +199,14 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
 }
 
 fn web(root: &Path, args: &[OsString]) -> Result<()> {
-    if !args.is_empty() {
-        bail!("web takes no arguments\n\n{USAGE}");
+    match args {
+        [] => web::build(root),
+        [flag] if flag == "--picture" => {
+            setup(root, true)?;
+            web::picture(root, &venv::python(root))
+        }
+        _ => bail!("web takes nothing but --picture\n\n{USAGE}"),
     }
-    web::build(root)
 }
 
 fn ament(root: &Path, args: &[OsString]) -> Result<()> {

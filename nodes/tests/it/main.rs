@@ -11,6 +11,7 @@ mod clients;
 mod common;
 mod console;
 mod datagrams;
+mod described;
 mod drill;
 mod examples;
 mod fault_orders;
