@@ -5,6 +5,7 @@ pub mod fault_orders;
 pub mod messages;
 pub mod node;
 pub mod orders;
+mod orders_heard;
 pub mod out;
 pub mod program;
 pub mod stamp;
