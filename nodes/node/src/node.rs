@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
@@ -14,6 +14,7 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
+use crate::health::{HEALTH, Health, Known};
 use crate::out;
 use crate::program::{MISSION, Program};
 use crate::stamp::Stamper;
@@ -39,6 +40,7 @@ pub struct MissionNode {
     /// Stamps of its ticks.
     pub stamper: Stamper,
     diagnostics: Publisher<DiagnosticArray>,
+    health: Mutex<Health>,
     keep: Option<PathBuf>,
     /// What is ordered to befall this node, the next first, and how often something has already.
     ordered: VecDeque<(Scheduled, Failure)>,
@@ -86,6 +88,7 @@ impl MissionNode {
         let process = Process::ALL.into_iter().find(|process| process.name() == name);
         let ordered = process.map(|process| mission.faults.of(process, model.period)).unwrap_or_default();
         let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
+        let health = Mutex::new(Health::new(Instant::now(), tick_of(&mission, &model)));
         Ok(Self {
             shutdown,
             horizon: mission.horizon(&model),
@@ -93,6 +96,7 @@ impl MissionNode {
             model,
             mission,
             diagnostics,
+            health,
             keep: (!keep.as_os_str().is_empty()).then_some(keep),
             ordered: ordered.into_iter().skip(struck as usize).collect(),
             struck,
@@ -149,8 +153,35 @@ impl MissionNode {
     pub fn wait(&self, timeout: Duration) -> Result<bool> {
         for notice in self.node.notices() {
             self.alarm(Severity::Warn, notice.trouble.name(), &notice.to_string())?;
+            self.health().count_more(notice.trouble.name(), notice.count);
         }
+        self.tell_health()?;
         Ok(self.node.wait(timeout)?)
+    }
+
+    /// Something that this node's health tells of went wrong so often since it was started.
+    pub fn count(&self, what: &'static str, total: u64) {
+        self.health().count(what, total);
+    }
+
+    fn health(&self) -> MutexGuard<'_, Health> {
+        self.health.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tell_health(&self) -> Result<()> {
+        let mut health = self.health();
+        let now = Instant::now();
+        if !health.turn(now) {
+            return Ok(());
+        }
+        let node = &self.node;
+        let known = Known {
+            now_ns: node.clock().now_ns(),
+            restarts: node.epoch(),
+            orphaned: node.orphaned(),
+            inputs: node.inputs(),
+        };
+        self.publish(node.clock().stamp(), HEALTH, health.tell(now, &known))
     }
 
     /// A tick of this mission.
@@ -207,18 +238,26 @@ impl MissionNode {
     }
 
     fn diagnose(&self, stamp: Time, level: u8, name: &str, text: &str) -> Result<()> {
+        self.publish(stamp, name, DiagnosticStatus { level, message: text.to_owned(), ..DiagnosticStatus::default() })
+    }
+
+    fn publish(&self, stamp: Time, name: &str, status: DiagnosticStatus) -> Result<()> {
         let status = DiagnosticStatus {
-            level,
             name: format!("{}: {name}", self.node.names().fully_qualified()),
-            message: text.to_owned(),
             hardware_id: "swath".to_owned(),
-            ..DiagnosticStatus::default()
+            ..status
         };
         let mut array = DiagnosticArray::default();
         array.header.stamp = stamp;
         array.status.push(status);
         self.diagnostics.publish(&array).context("cannot raise an alarm")
     }
+}
+
+/// How long a tick takes at the mission's pace; nothing in lockstep.
+fn tick_of(mission: &Mission, model: &Model) -> Duration {
+    let seconds = if mission.pace > 0.0 { model.period.seconds() / mission.pace } else { 0.0 };
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }
 
 /// Keeps a text in a file, whole or not at all.

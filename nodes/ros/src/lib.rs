@@ -74,7 +74,7 @@ pub use cdr::{Cdr, HEADER_LENGTH};
 pub use cli::RosArgs;
 pub use clock::{SimClock, stamp};
 pub use discovered::RemoteWriter;
-pub use endpoint::{RawPublisher, RawSample, RawSubscription, SampleInfo};
+pub use endpoint::{Input, RawPublisher, RawSample, RawSubscription, SampleInfo};
 pub use environment::{Environment, Mapping};
 pub use error::RosError;
 pub use message::{decode, encode};

@@ -1,7 +1,7 @@
 //! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ros2_client::Gid;
@@ -15,7 +15,7 @@ use crate::cli::RosArgs;
 use crate::clock::SimClock;
 use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
-use crate::endpoint::{RawPublisher, RawSubscription};
+use crate::endpoint::{Input, RawPublisher, RawSubscription, Watched};
 use crate::entities::Plan;
 use crate::environment::Environment;
 use crate::error::RosError;
@@ -35,7 +35,7 @@ use crate::replies::AllReplies;
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
 use crate::shutdown::signalled;
-use crate::signal::Signal;
+use crate::signal::{Signal, lock};
 use crate::slot::WriterSlot;
 use crate::topic::{Publisher, Subscription};
 
@@ -66,6 +66,7 @@ pub struct Node {
     pulse: Pulse,
     epoch: u64,
     replies: AllReplies,
+    inputs: Mutex<Vec<Watched>>,
     names: Names,
     environment: Environment,
     dds: Arc<Dds>,
@@ -129,6 +130,7 @@ impl Node {
             pulse,
             epoch,
             replies,
+            inputs: Mutex::default(),
             names,
             environment,
             dds,
@@ -216,6 +218,7 @@ impl Node {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
         self.roster.remember(Direction::Read, raw.gid(), topic.entry);
+        lock(&self.inputs).push(raw.watched(profile));
         Ok(Subscription::new(raw, topic.entry.writers))
     }
 
@@ -417,6 +420,12 @@ impl Node {
     /// Tells the launcher that what was ordered befalls this node now; with its number among those, from 0.
     pub fn tell_struck(&self, number: u64) {
         say(&Sign::Struck(number));
+    }
+
+    /// What has come on each topic that this node subscribes to.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<Input> {
+        lock(&self.inputs).iter().filter_map(Watched::look).collect()
     }
 
     /// The names of this node.

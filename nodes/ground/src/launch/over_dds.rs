@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
+use swath_node::health::HEALTH;
 use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
@@ -214,11 +215,11 @@ fn count_messages(bag: &Path) -> Result<u64> {
     Ok(information.message_count)
 }
 
-/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`.
+/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`. Its health is none.
 fn report(tick: Tick, status: DiagnosticStatus) -> Option<Report> {
     let (node, name) = status.name.split_once(": ")?;
     let (_, node) = node.rsplit_once('/')?;
-    let key = graph::MEMBERS.contains(&node).then(|| Key::new(node, name))?;
+    let key = (graph::MEMBERS.contains(&node) && name != HEALTH).then(|| Key::new(node, name))?;
     Some(Report { tick, key, wrong: status.level != DiagnosticStatus::OK, text: status.message })
 }
 

@@ -228,6 +228,7 @@ impl GuidanceNode {
             format!("task {task} did not come within {} s: holding attitude for {hold} s", self.deadline.as_secs_f64());
         self.base.alarm(Severity::Warn, "planner late", &text)?;
         let effects = self.logic.on_deadline();
+        self.base.count("late_tasks", self.logic.late);
         self.carry_out(effects)?;
         Ok(Duration::ZERO)
     }

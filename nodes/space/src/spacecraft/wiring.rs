@@ -181,6 +181,7 @@ impl SpacecraftNode {
             journal.add(&command)?;
         }
         let sample = self.logic.advance_by(&command);
+        self.base.count("missed_ticks", self.logic.missed);
         self.publish(&sample)
     }
 
