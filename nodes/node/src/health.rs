@@ -6,10 +6,13 @@ use std::time::{Duration, Instant};
 
 use swath_msgs::diagnostic_msgs::{DiagnosticStatus, KeyValue};
 use swath_ros::Input;
+use swath_ros::lifecycle::State;
 use swath_ros::qos::Profile;
 
 /// What a node's health is called on `/diagnostics`, after the node's name; it is no alarm.
 pub const HEALTH: &str = "health";
+/// Key of the state of its life cycle among what a node tells of its health.
+pub const STATE: &str = "lifecycle";
 
 /// How often it is told [wall time].
 const EVERY: Duration = Duration::from_secs(1);
@@ -39,6 +42,8 @@ pub(crate) struct Health {
 pub(crate) struct Known {
     /// Simulated time [ns].
     pub now_ns: u64,
+    /// Where it stands in its life.
+    pub state: State,
     /// How often it was started again.
     pub restarts: u64,
     /// How long its launcher has been gone.
@@ -76,11 +81,15 @@ impl Health {
         let simulated = known.now_ns.saturating_sub(self.now_ns) as f64 / 1e9;
         let speed = if self.now_ns == 0 { 0.0 } else { simulated / seconds };
         let mut values = vec![
+            value(STATE, &known.state.label()),
             value("restarts", &known.restarts),
             value("loop_hz", &format_args!("{:.1}", f64::from(self.turns) / seconds)),
             value("simulated_s_per_s", &format_args!("{speed:.2}")),
         ];
         let mut troubles = Vec::new();
+        if known.state != State::Active {
+            troubles.push(format!("it is {}", known.state.label()));
+        }
         for (what, (total, before)) in &mut self.counts {
             values.push(value(what, total));
             match *total - std::mem::replace(before, *total) {
@@ -140,7 +149,7 @@ mod tests {
     }
 
     fn known(now_s: u64, restarts: u64, inputs: Vec<Input>) -> Known {
-        Known { now_ns: now_s * 1_000_000_000, restarts, orphaned: None, inputs }
+        Known { now_ns: now_s * 1_000_000_000, state: State::Active, restarts, orphaned: None, inputs }
     }
 
     fn of<'a>(status: &'a DiagnosticStatus, key: &str) -> &'a str {
@@ -211,6 +220,9 @@ mod tests {
         assert_eq!((fresh.level, of(&fresh, "restarts")), (DiagnosticStatus::WARN, "2"));
         let later = health.tell(begin + Duration::from_secs(11), &known(1, 2, Vec::new()));
         assert_eq!(later.level, DiagnosticStatus::OK);
+        let inactive = Known { state: State::Inactive, ..known(1, 2, Vec::new()) };
+        let inactive = health.tell(begin + Duration::from_secs(12), &inactive);
+        assert_eq!((said(&inactive), of(&inactive, STATE)), ((DiagnosticStatus::WARN, "it is inactive"), "inactive"));
         let gone = Known { orphaned: Some(Duration::from_secs(7)), ..known(1, 2, Vec::new()) };
         let alone = health.tell(begin + Duration::from_secs(12), &gone);
         assert_eq!(said(&alone), (DiagnosticStatus::ERROR, "the launcher has been gone for 7 s"));

@@ -2,6 +2,7 @@
 
 pub mod error;
 pub mod health;
+pub mod lifecycle;
 pub mod messages;
 pub mod node;
 pub mod orders;

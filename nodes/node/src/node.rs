@@ -1,5 +1,6 @@
 //! What every node of a mission starts with: its ROS node, its mission, its alarms.
 
+use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,14 +10,14 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
+use swath_ros::{Managed, Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
 use crate::health::{HEALTH, Health, Known};
 use crate::out;
-use crate::program::{MISSION, Program};
+use crate::program::{AUTOSTART, MISSION, Program};
 use crate::stamp::Stamper;
 use swath_mission::alarms;
 use swath_mission::alarms::conditions::Report;
@@ -39,8 +40,16 @@ pub struct MissionNode {
     pub horizon: Tick,
     /// Stamps of its ticks.
     pub stamper: Stamper,
+    /// Where it stands in its life.
+    pub lifecycle: Managed,
+    /// Whether it is configured and activated by itself.
+    pub autostart: bool,
+    /// Whether it was configured before in this process.
+    again: Cell<bool>,
     diagnostics: Publisher<DiagnosticArray>,
     health: Mutex<Health>,
+    /// Who is missing, as it was told last; nothing once everybody was there.
+    missing: RefCell<Option<Vec<String>>>,
     keep: Option<PathBuf>,
     /// What is ordered to befall this node, the next first, and how often something has already.
     ordered: VecDeque<(Scheduled, Failure)>,
@@ -80,6 +89,9 @@ impl MissionNode {
             bail!("a mission with [link] flies in one process only: swath launch {} --in-process", path.display());
         }
         let model = Arc::new(mission.model()?);
+        let autostart = Spec::new(AUTOSTART.name, true, AUTOSTART.about).read_only();
+        let autostart = node.parameters().declare(autostart)?;
+        let lifecycle = node.managed()?;
         let keep =
             Spec::new("keep", String::new(), "Folder for what the node needs to go on when it is started again.");
         let keep = PathBuf::from(node.parameters().declare(keep.read_only())?);
@@ -95,8 +107,12 @@ impl MissionNode {
             stamper: Stamper::new(mission.epoch_unix_s, model.period).in_namespace(node.names().namespace()),
             model,
             mission,
+            lifecycle,
+            autostart,
+            again: Cell::new(false),
             diagnostics,
             health,
+            missing: RefCell::new(Some(Vec::new())),
             keep: (!keep.as_os_str().is_empty()).then_some(keep),
             ordered: ordered.into_iter().skip(struck as usize).collect(),
             struck,
@@ -110,12 +126,29 @@ impl MissionNode {
         self.keep.as_ref().map(|folder| folder.join(name))
     }
 
+    /// Whether there is a place for what it needs to go on.
+    #[must_use]
+    pub fn keeps_something(&self) -> bool {
+        self.keep.is_some()
+    }
+
+    /// From now on this node goes on where it was when it is configured again.
+    pub fn goes_on_from_here(&self) {
+        self.again.set(true);
+    }
+
+    /// Whether this node goes on where it was before, in this process or in one before it.
+    #[must_use]
+    pub fn goes_on(&self) -> bool {
+        self.node.epoch() > 0 || self.again.get()
+    }
+
     /// What this node kept in a file before it was started again; nothing if this is its first start.
     ///
     /// # Errors
     /// When the file is there and cannot be read.
     pub fn kept(&self, name: &str) -> Result<Option<String>> {
-        let Some(path) = self.keeps(name).filter(|path| self.node.epoch() > 0 && path.exists()) else {
+        let Some(path) = self.keeps(name).filter(|path| self.goes_on() && path.exists()) else {
             return Ok(None);
         };
         std::fs::read_to_string(&path).map(Some).with_context(|| format!("cannot read {}", path.display()))
@@ -141,6 +174,9 @@ impl MissionNode {
     /// The fault that befell this node last, if it was started again because of one.
     #[must_use]
     pub fn struck(&self) -> Option<Scheduled> {
+        if self.again.get() {
+            return None;
+        }
         let process = Process::ALL.into_iter().find(|process| self.node.names().name() == process.name())?;
         let last = usize::try_from(self.struck.checked_sub(1)?).ok()?;
         self.mission.faults.of(process, self.model.period).get(last).map(|(it, _)| *it)
@@ -151,12 +187,20 @@ impl MissionNode {
     /// # Errors
     /// When the node may not go on, or an alarm cannot be sent.
     pub fn wait(&self, timeout: Duration) -> Result<bool> {
+        self.tell_of_itself()?;
+        Ok(self.node.wait(timeout)?)
+    }
+
+    /// Tells what is due of its health and of the messages of others; for those who wait in another way.
+    ///
+    /// # Errors
+    /// When it cannot be sent.
+    pub fn tell_of_itself(&self) -> Result<()> {
         for notice in self.node.notices() {
             self.alarm(Severity::Warn, notice.trouble.name(), &notice.to_string())?;
             self.health().count_more(notice.trouble.name(), notice.count);
         }
-        self.tell_health()?;
-        Ok(self.node.wait(timeout)?)
+        self.tell_health()
     }
 
     /// Something that this node's health tells of went wrong so often since it was started.
@@ -168,15 +212,38 @@ impl MissionNode {
         self.health.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Says for whom this node waits, when that has changed, until everybody was there once.
+    pub fn tell_missing(&self, missing: Vec<String>) {
+        let mut told = self.missing.borrow_mut();
+        let Some(before) = told.as_mut() else { return };
+        if missing.is_empty() {
+            *told = None;
+        } else if *before != missing {
+            tracing::info!("waits: {}", missing.join(", "));
+            *before = missing;
+        }
+    }
+
+    /// The other nodes that fly, as far as this one sees them. Time's own node knows best for whom it waits.
+    fn look_around(&self) {
+        let name = self.node.names().name();
+        if name != graph::SPACECRAFT && self.missing.borrow().is_some() {
+            let others: Vec<&str> = graph::FLIGHT_NODES.into_iter().filter(|it| *it != name).collect();
+            self.tell_missing(self.node.missing_peers(&others));
+        }
+    }
+
     fn tell_health(&self) -> Result<()> {
         let mut health = self.health();
         let now = Instant::now();
         if !health.turn(now) {
             return Ok(());
         }
+        self.look_around();
         let node = &self.node;
         let known = Known {
             now_ns: node.clock().now_ns(),
+            state: self.lifecycle.state(),
             restarts: node.epoch(),
             orphaned: node.orphaned(),
             inputs: node.inputs(),

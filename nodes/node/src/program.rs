@@ -32,6 +32,12 @@ pub const PACE: Parameter = Parameter {
     about: "0: lockstep; 1: real time; x: x times real time; as the mission says without it.",
 };
 
+/// Whether a node works at once.
+pub const AUTOSTART: Parameter = Parameter {
+    name: "autostart",
+    about: "Whether the node is configured and activated by itself; if not, by its life cycle's services.",
+};
+
 /// What every node of a mission takes; [`MISSION`] must be given.
 const COMMON: &[Parameter] = &[
     MISSION,
@@ -42,6 +48,7 @@ const COMMON: &[Parameter] = &[
     Parameter { name: "orphaned_s", about: "How long it goes on without its launcher [s]; 0: there is none." },
     Parameter { name: "struck", about: "Faults ordered for this node that have befallen it already." },
     Parameter { name: "memory_limit_mb", about: "Memory that the process may have [10^6 B]; 0 without bound." },
+    AUTOSTART,
     Parameter {
         name: "packet_filter",
         about: "Whether the kernel drops datagrams that would end or fill the process.",

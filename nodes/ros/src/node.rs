@@ -21,6 +21,7 @@ use crate::environment::Environment;
 use crate::error::RosError;
 use crate::graph::{self, Entry};
 use crate::logging;
+use crate::managed::{Managed, Questions};
 use crate::members::{Identity, Members};
 use crate::memory;
 use crate::message::encode_as;
@@ -185,6 +186,25 @@ impl Node {
             describe_type: self.server(&graph::Service::new("~/get_type_description", &[], &[]))?,
             events: self.publisher(&graph::PARAMETER_EVENTS)?,
         })
+    }
+
+    /// The life cycle of this node, with its services and events; one call a node.
+    ///
+    /// # Errors
+    /// When DDS fails.
+    pub fn managed(&self) -> Result<Managed, RosError> {
+        let change = self.server(&graph::Service::new("~/change_state", &[], &[]))?;
+        let questions = Questions {
+            state: self.server(&graph::Service::new("~/get_state", &[], &[]))?,
+            states: self.server(&graph::Service::new("~/get_available_states", &[], &[]))?,
+            transitions: self.server(&graph::Service::new("~/get_available_transitions", &[], &[]))?,
+            graph: self.server(&graph::Service::new("~/get_transition_graph", &[], &[]))?,
+        };
+        let events = self.publisher(&graph::Topic::new("~/transition_event", Profile::Event, &[], &[]))?;
+        let signals = [&self.signal, self.background.signal()];
+        let (managed, services) = Managed::new(change, questions, events, self.clock.clone(), signals);
+        self.background.manage(services);
+        Ok(managed)
     }
 
     /// A writer of a topic.
@@ -353,6 +373,12 @@ impl Node {
             std::thread::sleep(SETTLING);
         }
         Ok(())
+    }
+
+    /// What is missing, in words, until each of the nodes is matched as [`Self::wait_for_peers`] waits for it.
+    #[must_use]
+    pub fn missing_peers(&self, nodes: &[&str]) -> Vec<String> {
+        self.roster.missing(nodes)
     }
 
     /// Waits until a server of the client's service is there.

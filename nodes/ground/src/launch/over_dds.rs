@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
-use swath_node::health::HEALTH;
+use swath_node::health::{HEALTH, STATE};
 use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
+use swath_ros::lifecycle::State;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::model::Model;
@@ -215,6 +216,12 @@ fn count_messages(bag: &Path) -> Result<u64> {
     Ok(information.message_count)
 }
 
+/// Whether a node tells of its health that it does nothing because somebody told it to.
+fn rests(status: &DiagnosticStatus) -> bool {
+    let waits = [State::Unconfigured, State::Inactive].map(State::label);
+    status.name.ends_with(HEALTH) && status.values.iter().any(|it| it.key == STATE && waits.contains(&&*it.value))
+}
+
 /// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`. Its health is none.
 fn report(tick: Tick, status: DiagnosticStatus) -> Option<Report> {
     let (node, name) = status.name.split_once(": ")?;
@@ -244,6 +251,8 @@ struct Launcher {
     paced: bool,
     stamper: Stamper,
     alarms: FlyingBoard,
+    /// When a node was last heard to rest because somebody told it to.
+    resting: Option<Instant>,
     /// When something happened to alarms that is not in the journal's file yet.
     unwritten: Option<Instant>,
     /// What is ordered to befall the recorder, which knows of no mission.
@@ -282,6 +291,7 @@ impl Launcher {
             last_summary: None,
             paced: mission.pace > 0.0,
             alarms: FlyingBoard::new(&node, model.period, stamper.clone(), planned)?,
+            resting: None,
             unwritten: None,
             stamper,
             recorder_faults: mission.faults.of(Process::Recorder, model.period).into(),
@@ -337,7 +347,9 @@ impl Launcher {
             self.take_rest(output)?;
             self.mind(fleet)?;
             self.mind_alarms(fleet, output)?;
-            if !self.paced && last_news.elapsed() > STALL_TIMEOUT {
+            // A mission that somebody made wait has not stalled.
+            let stands = last_news.max(self.resting.unwrap_or(last_news)).elapsed();
+            if !self.paced && stands > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
             }
             self.node.wait(WAIT)?;
@@ -368,6 +380,9 @@ impl Launcher {
             let tick = self.stamper.tick_from(&array.header.stamp);
             for status in array.status {
                 tracing::debug!("{}: {}", status.name, status.message);
+                if rests(&status) {
+                    self.resting = Some(Instant::now());
+                }
                 report(tick, status).into_iter().for_each(|report| self.alarms.report(report));
             }
         }

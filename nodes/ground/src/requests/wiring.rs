@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,6 +23,7 @@ use super::writer::Writer;
 use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity};
 use swath_node::orders::{operator_action, order_of};
 use swath_node::program::{Parameter, Program};
@@ -49,14 +51,11 @@ const PROGRAM: Program = Program {
 /// # Errors
 /// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = RequestNode::new(MissionNode::start(&PROGRAM)?)?;
-    let outcome = node.fly();
-    let RequestNode { mut writer, reader, .. } = node;
-    // The last connection to close the store leaves one file.
-    drop(reader);
-    // What was taken is written, also when the node ends on an error.
-    writer.finish()?;
-    outcome
+    let base = MissionNode::start(&PROGRAM)?;
+    let spec = Spec::new(STORE.name, String::new(), STORE.about);
+    let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, |base| RequestNode::new(base, path.clone()))
 }
 
 struct RequestNode {
@@ -82,7 +81,7 @@ struct RequestNode {
     written: Progress,
     writer: Writer,
     reader: Store,
-    base: MissionNode,
+    base: Rc<MissionNode>,
     /// Nobody else writes the store.
     _lock: StoreLock,
     /// Removed when the node ends.
@@ -90,10 +89,7 @@ struct RequestNode {
 }
 
 impl RequestNode {
-    fn new(base: MissionNode) -> Result<Self> {
-        let spec = Spec::new(STORE.name, String::new(), STORE.about);
-        let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
-        base.node.parameters().check_given()?;
+    fn new(base: &Rc<MissionNode>, path: PathBuf) -> Result<Self> {
         let (path, temporary) = if path.as_os_str().is_empty() {
             tracing::warn!("requests do not outlast this process: parameter `store` is not set");
             let folder = tempfile::tempdir().context("cannot make a temporary store")?;
@@ -101,10 +97,10 @@ impl RequestNode {
         } else {
             (path, None)
         };
-        let lock = StoreLock::take(&path, base.node.epoch() > 0)?;
+        let lock = StoreLock::take(&path, base.goes_on())?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
-        let logic = take_up(&base, &mut store)?;
+        let logic = take_up(base, &mut store)?;
         Ok(Self {
             desk: Desk::new(&base.node)?,
             points: base.node.subscription(&graph::DECISION_POINT)?,
@@ -125,20 +121,13 @@ impl RequestNode {
             writer: Writer::start(store, base.node.signal().clone()),
             reader,
             logic,
-            base,
+            base: Rc::clone(base),
             _lock: lock,
             _temporary: temporary,
         })
     }
 
-    fn fly(&mut self) -> Result<()> {
-        while !self.base.shutdown.asked() {
-            self.turn()?;
-        }
-        Ok(())
-    }
-
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<()> {
         let mut outgoing = Vec::new();
         while let Some(point) = self.points.take()? {
             if self.base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
@@ -147,7 +136,8 @@ impl RequestNode {
             }
             let offer = self.offer(&point)?;
             outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
-            outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
+            // One who rests offers nothing; guidance asks again.
+            outgoing.extend(offer.filter(|_| self.desk.open).map(|offer| Outgoing::Offer(Box::new(offer))));
             if point.mission_over {
                 outgoing.push(Outgoing::Summary);
             }
@@ -165,7 +155,8 @@ impl RequestNode {
             }
         }
         while let Some(request) = self.requests.take()? {
-            if let Err(refusal) = self.logic.submit(order_of(&request), self.logic.now()) {
+            let taken = self.desk.admit(1).and_then(|()| self.logic.submit(order_of(&request), self.logic.now()));
+            if let Err(refusal) = taken {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
@@ -301,6 +292,34 @@ impl RequestNode {
             self.aborts.publish(&messages::task_abort(&self.base.stamper, self.logic.now(), abort, reason))?;
         }
         Ok(())
+    }
+}
+
+impl LifecycleNode for RequestNode {
+    fn activate(&mut self) -> Result<()> {
+        self.desk.open = true;
+        Ok(())
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        self.desk.open = false;
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    /// Nothing is taken and nothing offered; what ends is written down, and questions are answered.
+    fn rest(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    fn end(self) -> Result<()> {
+        let Self { mut writer, reader, .. } = self;
+        // The last connection to close the store leaves one file.
+        drop(reader);
+        Ok(writer.finish()?)
     }
 }
 

@@ -114,6 +114,9 @@ pub enum Refusal {
         /// The step that is not there.
         illegal: IllegalTransition,
     },
+    /// The request manager rests.
+    #[error("the request manager is inactive: nothing is taken until it is activated")]
+    Inactive,
     /// A value of the call is not valid.
     #[error("{field} is {value}, outside {limits}")]
     Call {
@@ -139,7 +142,7 @@ impl Refusal {
             Self::Empty => Reason::Empty,
             Self::SameStrip { .. } => Reason::SameStrip,
             Self::Unknown { .. } | Self::UnknownReference { .. } => Reason::Unknown,
-            Self::State { .. } => Reason::State,
+            Self::State { .. } | Self::Inactive => Reason::State,
             Self::Call { .. } | Self::Attempts { .. } => Reason::Call,
         }
     }

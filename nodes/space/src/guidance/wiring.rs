@@ -1,6 +1,7 @@
 //! The guidance node's topics, deadlines and alarms.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -18,6 +19,7 @@ use swath_mission::alarms::conditions::{back, of_health};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::PACED_PATIENCE;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{PACE, Program};
 
@@ -47,11 +49,11 @@ const PROGRAM: Program = Program {
 /// # Errors
 /// When the node cannot come up or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = GuidanceNode::new(MissionNode::start(&PROGRAM)?)?;
-    while !node.base.shutdown.asked() {
-        node.turn()?;
-    }
-    Ok(())
+    let base = MissionNode::start(&PROGRAM)?;
+    let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
+    let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, |base| GuidanceNode::new(base, pace))
 }
 
 struct GuidanceNode {
@@ -78,7 +80,9 @@ struct GuidanceNode {
     kept: Option<(u64, bool)>,
     /// Whether something was wrong with wheels or sensors before.
     health_told: bool,
-    base: MissionNode,
+    /// Whether it commanded nothing since it last flew.
+    rested: bool,
+    base: Rc<MissionNode>,
 }
 
 /// A task that is wanted.
@@ -89,11 +93,8 @@ struct Question {
 }
 
 impl GuidanceNode {
-    fn new(base: MissionNode) -> Result<Self> {
+    fn new(base: &Rc<MissionNode>, pace: f64) -> Result<Self> {
         let mission = &base.mission;
-        let pace = Spec::new(PACE.name, mission.pace, PACE.about);
-        let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
-        base.node.parameters().check_given()?;
         let period = base.model.period;
         let seconds = if pace > 0.0 {
             (PACED_SHARE * period.seconds() / pace).max(PACED_PATIENCE.as_secs_f64())
@@ -104,17 +105,8 @@ impl GuidanceNode {
         let restarts = !planner_lost.is_empty() || !mission.faults.of(Process::RequestManager, period).is_empty();
         let deadline = Duration::from_secs_f64(seconds);
         let deadline = if restarts && pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
-        let hold = period.ticks_ceil(mission.hold_s);
-        let delay = period.ticks_ceil(mission.plant.planning_delay_s);
         Ok(Self {
-            logic: take_up(
-                &base,
-                pace,
-                GuidanceLogic::new((*base.model).clone(), base.horizon, hold)
-                    .with_planning_delay(delay)
-                    .watching(mission.plant.noisy())
-                    .struck_at(base.strikes_at()),
-            )?,
+            logic: take_up(base, pace)?,
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
             truths: match mission.tells_truth_apart(period) {
                 true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
@@ -134,24 +126,28 @@ impl GuidanceNode {
             nobody_plans: planner_lost.into_iter().map(|(it, _)| it).collect(),
             kept: None,
             // What the one before has told may be over.
-            health_told: base.node.epoch() > 0,
-            base,
+            health_told: base.goes_on(),
+            rested: false,
+            base: Rc::clone(base),
         })
     }
 
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<Duration> {
         while let Some(message) = self.aborts.take()? {
             if self.logic.on_abort(message.task) {
                 tracing::info!("task {} is given up: {}", message.task, message.reason);
             }
         }
         self.take_states()?;
+        while let Some(state) = self.next_state() {
+            let effects = self.logic.on_state(state);
+            self.tell_health()?;
+            self.carry_out(effects)?;
+        }
         while let Some(message) = self.tasks.take()? {
             self.take_task(&message)?;
         }
-        let wait = self.mind_question()?;
-        self.base.wait(wait)?;
-        Ok(())
+        self.mind_question()
     }
 
     fn take_states(&mut self) -> Result<()> {
@@ -167,20 +163,17 @@ impl GuidanceNode {
                 Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
             }
         }
-        while let Some(mut state) = self.unpaired.0.pop_front() {
-            if self.truths.is_some() {
-                state.truth = self.unpaired.1.remove(&state.tick);
-                if state.truth.is_none() {
-                    self.unpaired.0.push_front(state);
-                    break;
-                }
-                self.unpaired.1.retain(|&tick, _| tick > state.tick);
-            }
-            let effects = self.logic.on_state(state);
-            self.tell_health()?;
-            self.carry_out(effects)?;
-        }
         Ok(())
+    }
+
+    /// The next state, once its truth is there.
+    fn next_state(&mut self) -> Option<StateSample> {
+        let state = self.unpaired.0.front_mut()?;
+        if self.truths.is_some() {
+            state.truth = Some(self.unpaired.1.remove(&state.tick)?);
+            self.unpaired.1.retain(|&tick, _| tick > state.tick);
+        }
+        self.unpaired.0.pop_front()
     }
 
     /// Tells what came to be known of wheels and sensors; nothing as long as nothing was ever wrong.
@@ -292,8 +285,54 @@ impl GuidanceNode {
     }
 }
 
+impl LifecycleNode for GuidanceNode {
+    fn activate(&mut self) -> Result<()> {
+        if std::mem::take(&mut self.rested) {
+            // What was in hand counts as interrupted.
+            self.logic = fresh(&self.base).taking_up(self.logic.kept(), None);
+            (self.question, self.kept) = (None, None);
+        }
+        Ok(())
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        self.rested = true;
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        let wait = self.work()?;
+        self.base.wait(wait)?;
+        Ok(())
+    }
+
+    /// The wheels hold no torque. The last state waits for one who can end the mission.
+    fn rest(&mut self) -> Result<()> {
+        while self.aborts.take()?.is_some() {}
+        while self.tasks.take()?.is_some() {}
+        self.take_states()?;
+        while self.unpaired.0.front().is_some_and(|state| state.tick < self.base.horizon)
+            && let Some(state) = self.next_state()
+        {
+            self.send(&self.logic.idle(state.tick))?;
+        }
+        self.base.wait(ASK_AGAIN_AFTER)?;
+        Ok(())
+    }
+}
+
+/// Guidance that knows nothing of a flight yet.
+fn fresh(base: &MissionNode) -> GuidanceLogic {
+    let (mission, period) = (&base.mission, base.model.period);
+    GuidanceLogic::new((*base.model).clone(), base.horizon, period.ticks_ceil(mission.hold_s))
+        .with_planning_delay(period.ticks_ceil(mission.plant.planning_delay_s))
+        .watching(mission.plant.noisy())
+        .struck_at(base.strikes_at())
+}
+
 /// Guidance where the one before was, if there was one.
-fn take_up(base: &MissionNode, pace: f64, logic: GuidanceLogic) -> Result<GuidanceLogic> {
+fn take_up(base: &MissionNode, pace: f64) -> Result<GuidanceLogic> {
+    let logic = fresh(base);
     let Some(text) = base.kept(KEPT)? else { return Ok(logic) };
     let kept = messages::kept(&text)?;
     tracing::info!("guidance goes on after task {}", kept.task);
