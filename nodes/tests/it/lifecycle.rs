@@ -53,7 +53,9 @@ fn until_it_holds(out: &Path) {
 /// Strips are imaged again.
 fn until_it_images(out: &Path) {
     let since = tasks(out).len();
-    common::until("an image", || tasks(out)[since..].iter().any(|it| it["success"] == true && !holds(it)).then_some(()));
+    common::until("an image", || {
+        tasks(out)[since..].iter().any(|it| it["success"] == true && !holds(it)).then_some(())
+    });
 }
 
 #[test]
@@ -93,7 +95,8 @@ fn the_planner_rests(domain: &str, node: &Node, out: &Path) {
     assert_eq!(seen["before"], "active", "it comes up active by itself");
     let done: Vec<_> = seen["steps"].as_array().unwrap().iter().map(|step| &step["done"]).collect();
     assert_eq!(done, [false, false, true, false], "{seen}");
-    let events = json!([[4, "deactivate", "active", "deactivating"], [40, "transition_success", "deactivating", "inactive"]]);
+    let events =
+        json!([[4, "deactivate", "active", "deactivating"], [40, "transition_success", "deactivating", "inactive"]]);
     assert_eq!((&seen["steps"][0]["events"], &seen["steps"][2]["events"]), (&json!([]), &events));
     let available = json!([[4, "deactivate", "active", "deactivating"], [7, "shutdown", "active", "shuttingdown"]]);
     assert_eq!((&seen["available"], seen["graph"].as_array().unwrap().len()), (&available, 25));
@@ -193,13 +196,13 @@ fn a_node_that_does_not_start_by_itself_waits_for_its_manager() {
     planner.args(["--ros-args", "-p", &format!("mission:={}", mission.display()), "-p", "autostart:=false"]);
     let mut planner = planner.spawn().unwrap();
     let seen = manage(&domain, "/swath/planner", &["activate", "configure", "activate", "deactivate", "cleanup"]);
-    let available = json!([[1, "configure", "unconfigured", "configuring"], [5, "shutdown", "unconfigured", "shuttingdown"]]);
+    let available =
+        json!([[1, "configure", "unconfigured", "configuring"], [5, "shutdown", "unconfigured", "shuttingdown"]]);
     assert_eq!((&seen["before"], &seen["available"]), (&json!("unconfigured"), &available));
     let steps: Vec<_> = seen["steps"].as_array().unwrap().iter().map(|it| (&it["done"], &it["state"])).collect();
     let (yes, no) = (json!(true), json!(false));
     let [unconfigured, inactive, active] = ["unconfigured", "inactive", "active"].map(Value::from);
-    let expected =
-        [(&no, &unconfigured), (&yes, &inactive), (&yes, &active), (&yes, &inactive), (&no, &inactive)];
+    let expected = [(&no, &unconfigured), (&yes, &inactive), (&yes, &active), (&yes, &inactive), (&no, &inactive)];
     assert_eq!(steps, expected, "what it knows would be lost without `keep`: {seen}");
     told(&domain, "/swath/planner", &["shutdown"]);
     assert!(planner.wait().unwrap().success());
@@ -223,7 +226,9 @@ fn ros2_lifecycle_manages_a_node() {
     common::until("the node", || ros2(&["nodes"]).contains("/swath/planner").then_some(()));
     assert_eq!(ros2(&["get", "/swath/planner"]), "unconfigured [1]");
     assert!(ros2(&["set", "/swath/planner", "activate"]).starts_with("Unknown transition requested"));
-    for (transition, state) in [("configure", "inactive [2]"), ("activate", "active [3]"), ("deactivate", "inactive [2]")] {
+    for (transition, state) in
+        [("configure", "inactive [2]"), ("activate", "active [3]"), ("deactivate", "inactive [2]")]
+    {
         assert_eq!(ros2(&["set", "/swath/planner", transition]), "Transitioning successful");
         assert_eq!(ros2(&["get", "/swath/planner"]), state);
     }

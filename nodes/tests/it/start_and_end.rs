@@ -52,7 +52,7 @@ fn fly(mission: &Path, order: [&str; 4], log: &Path) -> (BTreeMap<u64, (u64, u64
 #[test]
 fn whoever_comes_first_waits_for_the_others_and_the_mission_is_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let text = "orbits = 0.3\nseed = 5\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [800, 800]\n";
+    let text = "orbits = 0.4\nseed = 5\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [800, 800]\n";
     let mission = common::write_mission(folder.path(), text);
     let [spacecraft, guidance, planner, requests] = FLIGHT;
     let log = folder.path().join("log");

@@ -157,7 +157,8 @@ class Manager:
         requests.write(kind(CLIENT, self.number, argument))
         while time.monotonic() < deadline:
             for response in responses.take(10):
-                if (response.client, response.number) == (CLIENT, self.number):
+                # Among them are notes that a server has gone.
+                if (getattr(response, "client", None), getattr(response, "number", 0)) == (CLIENT, self.number):
                     return response
             time.sleep(0.01)
         sys.exit(f"nobody answers {name}")
@@ -169,7 +170,7 @@ class Manager:
         self.events.take(100)
         done = self.call("change_state", Transition(0, label)).success
         time.sleep(0.2)
-        events = [named(event) for event in self.events.take(100)]
+        events = [named(event) for event in self.events.take(100) if isinstance(event, TransitionEvent)]
         return {"asked": label, "done": done, "events": events, "state": self.state() if label != "shutdown" else None}
 
 

@@ -102,7 +102,9 @@ impl Keeping {
         let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).with_context(failed)?;
         match file.try_lock() {
             Ok(()) => Ok(file),
-            Err(TryLockError::WouldBlock) => bail!("the launcher of this mission is there: {} is locked", path.display()),
+            Err(TryLockError::WouldBlock) => {
+                bail!("the launcher of this mission is there: {} is locked", path.display())
+            }
             Err(TryLockError::Error(error)) => Err(error).with_context(failed),
         }
     }
@@ -154,13 +156,7 @@ mod tests {
         assert!(error.contains("no flight over DDS can be taken over here") && error.contains(LAUNCHER), "{error}");
         let key = Key::new("guidance", "wheel y");
         let report = Report { tick: Tick(7), key: key.clone(), wrong: true, text: "weak".to_owned() };
-        let wish = Wish {
-            tick: Tick(9),
-            key,
-            act: Act::Acknowledge,
-            actor: "ana".to_owned(),
-            comment: String::new(),
-        };
+        let wish = Wish { tick: Tick(9), key, act: Act::Acknowledge, actor: "ana".to_owned(), comment: String::new() };
         let flight = KeptFlight { reports: vec![report], wishes: vec![wish], flown_s: 2.5, ..KeptFlight::default() };
         keeping.keep_flight(&flight).unwrap();
         assert_eq!(keeping.flight().unwrap(), flight);
