@@ -1,19 +1,20 @@
 //! The processes of a mission: started, listened to, and started again when they are lost.
 
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use rustix::process::Signal;
 use swath_ros::Sign;
 
 use swath_mission::outcome::NodeProcess;
 use swath_mission::supervision::{Step, SupervisionConfig, Watch};
 
-use super::kept::{Keeping, KeptMember};
-use super::process::{Ending, Running};
-
+/// How long a process may take to end after it was asked to.
+const STOP_TIMEOUT: Duration = Duration::from_secs(20);
 /// How long what a process has said before it ended may take to be read.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 
@@ -24,7 +25,6 @@ pub struct Fleet {
     began: Instant,
     /// Simulated time as the nodes know it [ns].
     now_ns: u64,
-    keeping: Keeping,
 }
 
 /// What has become of a process.
@@ -64,7 +64,7 @@ pub enum Happened {
 
 struct Member {
     name: String,
-    program: String,
+    program: PathBuf,
     /// Words of its command line, the last ones ROS's.
     args: Vec<String>,
     /// Parameters of the next start.
@@ -82,42 +82,24 @@ struct Member {
     beside: bool,
 }
 
+struct Running {
+    child: Child,
+    lines: Receiver<String>,
+}
+
 impl Fleet {
     /// No processes yet.
-    pub fn new(config: &SupervisionConfig, keeping: Keeping) -> Self {
-        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0, keeping }
-    }
-
-    /// The processes that a launcher before has left; those that have ended meanwhile are started again.
-    pub fn take_over(config: &SupervisionConfig, keeping: Keeping) -> Result<Self> {
-        let mut fleet = Self::new(config, keeping);
-        for kept in fleet.keeping.fleet()? {
-            let signs = fleet.keeping.signs(&kept.name);
-            let running = kept.process.map_or(Ok(None), |process| Running::take_over(process, &signs))?;
-            let mut member = fleet.member(&kept.name, &kept.program, &kept.args);
-            member.lost = running.is_none();
-            if member.lost {
-                let _ = member.watch.lost(fleet.began.elapsed());
-            }
-            let KeptMember { extra, epoch, struck, beside, .. } = kept;
-            fleet.members.push(Member { extra, epoch, struck, beside, running, ..member });
-        }
-        Ok(fleet)
-    }
-
-    /// Keeps who flies.
-    fn keep(&self) -> Result<()> {
-        let members: Vec<KeptMember> = self.members.iter().map(Member::kept).collect();
-        self.keeping.keep_fleet(&members)
+    pub fn new(config: &SupervisionConfig) -> Self {
+        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0 }
     }
 
     /// Starts a program of this suite: the one beside this executable, or else the one on the PATH. The words end with
     /// those of ROS.
     pub fn start(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
         let mut member = self.member(name, program, args);
-        member.start(&self.config, &self.keeping)?;
+        member.start(&self.config)?;
         self.members.push(member);
-        self.keep()
+        Ok(())
     }
 
     /// As [`Self::start`], a process without which the mission goes on, and which gives no sign of life. It is started
@@ -125,15 +107,15 @@ impl Fleet {
     pub fn start_beside(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
         let mut member = self.member(name, program, args);
         member.beside = true;
-        member.start(&self.config, &self.keeping)?;
+        member.start(&self.config)?;
         self.members.push(member);
-        self.keep()
+        Ok(())
     }
 
     fn member(&self, name: &str, program: &str, args: &[String]) -> Member {
         Member {
             name: name.to_owned(),
-            program: program.to_owned(),
+            program: program_path(program),
             args: args.to_vec(),
             extra: Vec::new(),
             running: None,
@@ -172,8 +154,9 @@ impl Fleet {
     pub fn freeze(&mut self, node: &str) -> Result<()> {
         for member in self.members.iter_mut().filter(|member| member.name == node) {
             member.by_order = true;
-            if let Some(running) = &member.running {
-                running.send(Signal::STOP)?;
+            let pid = member.running.as_ref().and_then(|it| rustix::process::Pid::from_raw(it.child.id() as i32));
+            if let Some(pid) = pid {
+                rustix::process::kill_process(pid, rustix::process::Signal::STOP)?;
             }
         }
         Ok(())
@@ -211,8 +194,8 @@ impl Fleet {
     /// Fails when a process has ended: so it is before the mission has begun.
     pub fn check(&mut self) -> Result<()> {
         for member in self.members.iter_mut().filter(|member| !member.beside) {
-            if let Some(ending) = member.ended()? {
-                bail!("{} before the mission was over", ending.of(&member.name));
+            if let Some(status) = member.ended()? {
+                bail!("{} before the mission was over", ending(&member.name, status));
             }
         }
         Ok(())
@@ -221,7 +204,6 @@ impl Fleet {
     /// Listens to all processes, kills those that hang, starts those that were lost again, and tells of it.
     pub fn supervise(&mut self) -> Result<Vec<Event>> {
         let mut events = Vec::new();
-        let before: Vec<_> = self.members.iter().map(Member::marks).collect();
         for member in &mut self.members {
             let name = member.name.clone();
             let mut tell = |what| events.push(Event { node: name.clone(), what });
@@ -230,14 +212,14 @@ impl Fleet {
             if back && std::mem::take(&mut member.lost) {
                 tell(Happened::Back { by_order: std::mem::take(&mut member.by_order) });
             }
-            if let Some(ending) = member.ended()? {
+            if let Some(status) = member.ended()? {
                 member.hear_out(now, &mut self.now_ns);
                 member.running = None;
                 member.lost = true;
-                let how = ending.of(&member.name);
+                let how = ending(&member.name, status);
                 let by_order = member.by_order;
                 // One that ends by itself has said why, and would do so again.
-                let leaves = member.beside && !ending.is_killed();
+                let leaves = member.beside && status.signal().is_none();
                 let step = if leaves { member.watch.give_up() } else { member.watch.lost(now) };
                 tracing::warn!("{how}");
                 tell(match step {
@@ -260,15 +242,12 @@ impl Fleet {
                 }
                 Step::Start => {
                     member.epoch += 1;
-                    member.start(&self.config, &self.keeping)?;
+                    member.start(&self.config)?;
                     member.watch.started(now);
                     tracing::info!("node {} is started again", member.name);
                 }
                 Step::Nothing | Step::GiveUp => {}
             }
-        }
-        if self.members.iter().map(Member::marks).ne(before) {
-            self.keep()?;
         }
         Ok(events)
     }
@@ -277,7 +256,7 @@ impl Fleet {
     pub fn processes(&self) -> Vec<NodeProcess> {
         let of = |member: &Member| {
             let running = member.running.as_ref()?;
-            Some(NodeProcess { name: member.name.clone(), pid: running.pid() })
+            Some(NodeProcess { name: member.name.clone(), pid: running.child.id() })
         };
         self.members.iter().filter_map(of).collect()
     }
@@ -288,9 +267,9 @@ impl Fleet {
             let Some(at) = self.members.iter().position(|member| member.name == *name) else { continue };
             let member = self.members.swap_remove(at);
             let Some(mut running) = member.running else { bail!("node {name} was lost and is not there again") };
-            let ending = running.stop()?;
-            if !ending.is_well() {
-                bail!("{}", ending.of(name));
+            let status = stop(&mut running.child)?;
+            if !status.success() {
+                bail!("{}", ending(name, status));
             }
         }
         Ok(())
@@ -298,47 +277,39 @@ impl Fleet {
 }
 
 impl Member {
-    fn start(&mut self, config: &SupervisionConfig, keeping: &Keeping) -> Result<()> {
-        let signs = keeping.make_signs(&self.name)?;
-        let mut own = vec![
-            format!("epoch:={}", self.epoch),
-            format!("orphaned_s:={:?}", config.orphaned_s),
-            format!("signs:={}", signs.display()),
-        ];
+    fn start(&mut self, config: &SupervisionConfig) -> Result<()> {
+        let mut own = vec![format!("epoch:={}", self.epoch), format!("orphaned_s:={:?}", config.orphaned_s)];
         if self.beside {
             own.clear();
         } else if self.struck > 0 {
             own.push(format!("struck:={}", self.struck));
         }
-        let program = program_path(&self.program);
-        let mut command = Command::new(&program);
-        command.args(&self.args).args(own.iter().flat_map(|it| ["-p", it])).args(&self.extra);
-        let failed = || format!("cannot start node {}: {}", self.name, program.display());
-        self.running = Some(Running::start(&mut command).with_context(failed)?);
+        let mut child = Command::new(&self.program)
+            .args(&self.args)
+            .args(own.iter().flat_map(|it| ["-p", it]))
+            .args(&self.extra)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .with_context(|| format!("cannot start node {}: {}", self.name, self.program.display()))?;
+        let (sender, lines) = channel();
+        if let Some(stdout) = child.stdout.take() {
+            std::thread::spawn(move || {
+                for line in BufReader::new(stdout).lines().map_while(Result::ok) {
+                    if sender.send(line).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        self.running = Some(Running { child, lines });
         Ok(())
     }
 
-    fn kept(&self) -> KeptMember {
-        KeptMember {
-            name: self.name.clone(),
-            program: self.program.clone(),
-            args: self.args.clone(),
-            extra: self.extra.clone(),
-            epoch: self.epoch,
-            struck: self.struck,
-            beside: self.beside,
-            process: self.running.as_ref().and_then(Running::name),
-        }
-    }
-
-    /// What changes whenever something has to be kept.
-    fn marks(&self) -> (u64, u64, usize, Option<u32>) {
-        (self.epoch, self.struck, self.extra.len(), self.running.as_ref().map(Running::pid))
-    }
-
     /// How its process has ended, if it has.
-    fn ended(&mut self) -> Result<Option<Ending>> {
-        self.running.as_mut().map_or(Ok(None), Running::ended)
+    fn ended(&mut self) -> Result<Option<ExitStatus>> {
+        let Some(running) = &mut self.running else { return Ok(None) };
+        Ok(running.child.try_wait()?)
     }
 
     /// Takes in what it has said; returns whether it gives its first sign of life since its start.
@@ -377,19 +348,55 @@ impl Member {
     }
 
     fn kill(&mut self) -> Result<()> {
-        self.running.as_ref().map_or(Ok(()), |running| running.send(Signal::KILL))
+        match &mut self.running {
+            Some(running) => running.child.kill().with_context(|| format!("cannot kill node {}", self.name)),
+            None => Ok(()),
+        }
     }
 }
 
 impl Drop for Fleet {
     fn drop(&mut self) {
         let running = || self.members.iter().filter_map(|member| member.running.as_ref());
-        // Nothing more can be done for a process that cannot be ended.
-        running().for_each(|running| _ = running.send(Signal::INT));
+        running().for_each(|running| interrupt(&running.child));
         for running in self.members.iter_mut().filter_map(|member| member.running.as_mut()) {
-            let _ = running.stop();
+            // Nothing more can be done for a process that cannot be ended.
+            let _ = stop(&mut running.child);
         }
     }
+}
+
+/// How a process has ended, in words. One that fails says why by itself; one that is killed cannot.
+fn ending(name: &str, status: ExitStatus) -> String {
+    match (status.code(), status.signal()) {
+        (Some(0), _) => format!("node {name} has ended"),
+        (Some(code), _) => format!("node {name} has failed (exit code {code}; it has said why)"),
+        (None, Some(signal)) => format!("node {name} was killed by signal {signal}"),
+        (None, None) => format!("node {name} has ended ({status})"),
+    }
+}
+
+fn interrupt(child: &Child) {
+    if let Some(pid) = rustix::process::Pid::from_raw(child.id() as i32) {
+        // It may have ended by itself.
+        let _ = rustix::process::kill_process(pid, rustix::process::Signal::INT);
+    }
+}
+
+fn stop(child: &mut Child) -> Result<ExitStatus> {
+    if let Some(status) = child.try_wait()? {
+        return Ok(status);
+    }
+    interrupt(child);
+    let deadline = Instant::now() + STOP_TIMEOUT;
+    while Instant::now() < deadline {
+        if let Some(status) = child.try_wait()? {
+            return Ok(status);
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    child.kill()?;
+    Ok(child.wait()?)
 }
 
 fn program_path(program: &str) -> PathBuf {

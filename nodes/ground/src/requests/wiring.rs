@@ -187,11 +187,6 @@ impl RequestNode {
             }
         };
         if now < self.logic.now() && self.last.is_none() {
-            if self.base.goes_on() {
-                // A reader that comes late is sent what the writer still holds.
-                tracing::debug!("a decision point of {now} is old");
-                return Ok(None);
-            }
             let known = self.logic.now();
             bail!("store {} is of a flight that is at {known}, this one is at {now}", self.reader.path().display());
         }

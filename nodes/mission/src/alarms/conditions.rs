@@ -1,6 +1,5 @@
 //! What nodes report of conditions that follow from the mission itself, so that each flight of it reports the same.
 
-use serde::{Deserialize, Serialize};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::health::Health;
 
@@ -20,7 +19,7 @@ const CATALOGUE: &str = "catalogue";
 const LAUNCHER: &str = "launcher";
 
 /// A node says whether something is wrong.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// When.
     pub tick: Tick,

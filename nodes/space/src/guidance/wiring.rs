@@ -69,9 +69,6 @@ struct GuidanceNode {
     status: Publisher<msg::GuidanceStatus>,
     phases: Publisher<msg::TaskPhase>,
     aborts: Subscription<msg::TaskAbort>,
-    /// The last decision point, and how many launchers were told of it.
-    last_point: Option<msg::DecisionPoint>,
-    told_to: u64,
     /// Task and whether it images, as they were told last.
     phase_told: Option<(u64, bool)>,
     status_every: u64,
@@ -83,8 +80,6 @@ struct GuidanceNode {
     kept: Option<(u64, bool)>,
     /// Whether something was wrong with wheels or sensors before.
     health_told: bool,
-    /// States before are old.
-    since: Tick,
     /// Whether it commanded nothing since it last flew.
     rested: bool,
     base: Rc<MissionNode>,
@@ -124,8 +119,6 @@ impl GuidanceNode {
             status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
             phases: base.node.publisher(&graph::TASK_PHASE)?,
             aborts: base.node.subscription(&graph::TASK_ABORT)?,
-            last_point: None,
-            told_to: 0,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             deadline,
@@ -134,14 +127,12 @@ impl GuidanceNode {
             kept: None,
             // What the one before has told may be over.
             health_told: base.goes_on(),
-            since: base.stamper.tick_from(&base.node.clock().stamp()),
             rested: false,
             base: Rc::clone(base),
         })
     }
 
     fn work(&mut self) -> Result<Duration> {
-        self.tell_another_launcher()?;
         while let Some(message) = self.aborts.take()? {
             if self.logic.on_abort(message.task) {
                 tracing::info!("task {} is given up: {}", message.task, message.reason);
@@ -159,17 +150,6 @@ impl GuidanceNode {
         self.mind_question()
     }
 
-    /// A launcher that takes over learns how far the mission is; the others only answer again.
-    fn tell_another_launcher(&mut self) -> Result<()> {
-        let launchers = self.base.node.taken_over();
-        if std::mem::replace(&mut self.told_to, launchers) != launchers
-            && let Some(point) = &self.last_point
-        {
-            self.points.publish(point)?;
-        }
-        Ok(())
-    }
-
     fn take_states(&mut self) -> Result<()> {
         while let Some(message) = self.truths.as_ref().map_or(Ok(None), Subscription::take)? {
             match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
@@ -179,8 +159,6 @@ impl GuidanceNode {
         }
         while let Some(message) = self.states.take()? {
             match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
-                // A reader that comes late is sent what the writer still holds.
-                Ok(state) if state.tick < self.since => {}
                 Ok(state) => self.unpaired.0.push_back(state),
                 Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
             }
@@ -258,7 +236,6 @@ impl GuidanceNode {
                 Effect::Decide(point) => {
                     let message = messages::decision_point(&self.base.stamper, &point);
                     self.points.publish(&message)?;
-                    self.last_point = Some(message.clone());
                     let now = Instant::now();
                     self.question = (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
                     self.hold_without_planner(point.state.tick)?;
