@@ -15,6 +15,7 @@ use crate::cli::RosArgs;
 use crate::clock::SimClock;
 use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
+use crate::drops::{Dropping, Drops};
 use crate::endpoint::{Input, RawPublisher, RawSubscription, Watched};
 use crate::entities::Plan;
 use crate::environment::Environment;
@@ -68,6 +69,7 @@ pub struct Node {
     epoch: u64,
     replies: AllReplies,
     inputs: Mutex<Vec<Watched>>,
+    drops: Arc<Drops>,
     names: Names,
     environment: Environment,
     dds: Arc<Dds>,
@@ -132,6 +134,7 @@ impl Node {
             epoch,
             replies,
             inputs: Mutex::default(),
+            drops: Arc::default(),
             names,
             environment,
             dds,
@@ -239,7 +242,13 @@ impl Node {
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
         self.roster.remember(Direction::Read, raw.gid(), topic.entry);
         lock(&self.inputs).push(raw.watched(profile));
-        Ok(Subscription::new(raw, topic.entry.writers))
+        let drops = graph::COME_AGAIN.contains(&topic.entry).then(|| Arc::clone(&self.drops));
+        Ok(Subscription::new(raw, topic.entry.writers, drops))
+    }
+
+    /// Drops a share of the messages that come again when they are not answered, drawn from a seed: a fault by order.
+    pub fn set_drops(&self, seed: u64, drops: Vec<Dropping>) {
+        self.drops.set(seed, drops);
     }
 
     /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type

@@ -117,6 +117,9 @@ pub enum Refusal {
     /// The request manager rests.
     #[error("the request manager is inactive: nothing is taken until it is activated")]
     Inactive,
+    /// There is no room where requests are kept.
+    #[error("there is no room where requests are kept: nothing can be taken until there is some")]
+    StoreFull,
     /// A value of the call is not valid.
     #[error("{field} is {value}, outside {limits}")]
     Call {
@@ -143,6 +146,7 @@ impl Refusal {
             Self::SameStrip { .. } => Reason::SameStrip,
             Self::Unknown { .. } | Self::UnknownReference { .. } => Reason::Unknown,
             Self::State { .. } | Self::Inactive => Reason::State,
+            Self::StoreFull => Reason::StoreFull,
             Self::Call { .. } | Self::Attempts { .. } => Reason::Call,
         }
     }

@@ -1,7 +1,6 @@
 //! The guidance node's topics, deadlines and alarms.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -25,6 +24,10 @@ use swath_node::program::{PACE, Program};
 
 /// How long a question without an answer waits before it is asked again.
 const ASK_AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// The same where messages are dropped by order.
+const ASK_SOON_AFTER: Duration = Duration::from_millis(50);
+/// A question is asked at least so often before its deadline.
+const TIMES_ASKED: u32 = 5;
 /// Share of a tick's wall-clock time that planning may take in a paced mission.
 const PACED_SHARE: f64 = 0.8;
 /// How long, instead of the mission's deadline, a task is waited for whose planner may be started again on the way.
@@ -59,8 +62,8 @@ pub fn run() -> Result<()> {
 struct GuidanceNode {
     logic: GuidanceLogic,
     states: Subscription<msg::SpacecraftState>,
-    /// There is one where the sensors are not exact.
-    truths: Option<Subscription<msg::SpacecraftState>>,
+    /// What the sensors do not tell, where they are not exact.
+    truths: Subscription<msg::SpacecraftState>,
     /// States that wait for the truth of their tick, and truths that wait for their states.
     unpaired: (VecDeque<StateSample>, BTreeMap<Tick, BodyState>),
     tasks: Subscription<msg::ImagingTask>,
@@ -72,7 +75,9 @@ struct GuidanceNode {
     /// Task and whether it images, as they were told last.
     phase_told: Option<(u64, bool)>,
     status_every: u64,
+    pace: f64,
     deadline: Duration,
+    ask_again_after: Duration,
     question: Option<Question>,
     /// When there is no planner, by order.
     nobody_plans: Vec<Scheduled>,
@@ -80,9 +85,11 @@ struct GuidanceNode {
     kept: Option<(u64, bool)>,
     /// Whether something was wrong with wheels or sensors before.
     health_told: bool,
+    /// States before are old.
+    since: Tick,
     /// Whether it commanded nothing since it last flew.
     rested: bool,
-    base: Rc<MissionNode>,
+    base: MissionNode,
 }
 
 /// A task that is wanted.
@@ -93,25 +100,12 @@ struct Question {
 }
 
 impl GuidanceNode {
-    fn new(base: &Rc<MissionNode>, pace: f64) -> Result<Self> {
-        let mission = &base.mission;
+    fn new(base: MissionNode, pace: f64) -> Result<Self> {
         let period = base.model.period;
-        let seconds = if pace > 0.0 {
-            (PACED_SHARE * period.seconds() / pace).max(PACED_PATIENCE.as_secs_f64())
-        } else {
-            mission.planning_deadline_s
-        };
-        let planner_lost = mission.faults.of(Process::Planner, period);
-        let restarts = !planner_lost.is_empty() || !mission.faults.of(Process::RequestManager, period).is_empty();
-        let deadline = Duration::from_secs_f64(seconds);
-        let deadline = if restarts && pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
-        Ok(Self {
-            logic: take_up(base, pace)?,
+        let mut node = Self {
+            logic: take_up(&base, pace)?,
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
-            truths: match mission.tells_truth_apart(period) {
-                true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
-                false => None,
-            },
+            truths: base.node.subscription(&graph::SPACECRAFT_TRUTH)?,
             unpaired: Default::default(),
             tasks: base.node.subscription(&graph::PLANNER_TASK)?,
             torques: base.node.publisher(&graph::WHEEL_TORQUE)?,
@@ -121,15 +115,37 @@ impl GuidanceNode {
             aborts: base.node.subscription(&graph::TASK_ABORT)?,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
-            deadline,
+            pace,
+            deadline: Duration::ZERO,
+            ask_again_after: ASK_AGAIN_AFTER,
             question: None,
-            nobody_plans: planner_lost.into_iter().map(|(it, _)| it).collect(),
+            nobody_plans: Vec::new(),
             kept: None,
             // What the one before has told may be over.
             health_told: base.goes_on(),
+            since: base.stamper.tick_from(&base.node.clock().stamp()),
             rested: false,
-            base: Rc::clone(base),
-        })
+            base,
+        };
+        node.mind_faults();
+        Ok(node)
+    }
+
+    /// What follows from the faults by order, those that were ordered on the way too.
+    fn mind_faults(&mut self) {
+        let faults = &self.base.mission.faults;
+        let period = self.base.model.period;
+        self.nobody_plans = faults.of(Process::Planner, period).into_iter().map(|(it, _)| it).collect();
+        let restarts = !self.nobody_plans.is_empty() || !faults.of(Process::RequestManager, period).is_empty();
+        let deadline = Duration::from_secs_f64(if self.pace > 0.0 {
+            (PACED_SHARE * period.seconds() / self.pace).max(PACED_PATIENCE.as_secs_f64())
+        } else {
+            self.base.mission.planning_deadline_s
+        });
+        self.deadline = if restarts && self.pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
+        let patience = if faults.drops(period).is_empty() { ASK_AGAIN_AFTER } else { ASK_SOON_AFTER };
+        self.ask_again_after = patience.min(self.deadline / TIMES_ASKED);
+        self.logic.set_struck_at(self.base.strikes_at());
     }
 
     fn work(&mut self) -> Result<Duration> {
@@ -151,7 +167,7 @@ impl GuidanceNode {
     }
 
     fn take_states(&mut self) -> Result<()> {
-        while let Some(message) = self.truths.as_ref().map_or(Ok(None), Subscription::take)? {
+        while let Some(message) = self.truths.take()? {
             match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
                 Ok(truth) => _ = self.unpaired.1.insert(truth.tick, truth.body),
                 Err(error) => self.base.alarm(Severity::Error, "truth refused", &error.to_string())?,
@@ -159,21 +175,36 @@ impl GuidanceNode {
         }
         while let Some(message) = self.states.take()? {
             match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
+                // A reader that comes late is sent what the writer still holds.
+                Ok(state) if state.tick < self.since => {}
                 Ok(state) => self.unpaired.0.push_back(state),
                 Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
             }
         }
+        if self.base.take_fault_orders()? {
+            self.mind_faults();
+        }
         Ok(())
     }
 
-    /// The next state, once its truth is there.
+    /// The next state, once its truth is there, where there is one.
     fn next_state(&mut self) -> Option<StateSample> {
-        let state = self.unpaired.0.front_mut()?;
-        if self.truths.is_some() {
-            state.truth = Some(self.unpaired.1.remove(&state.tick)?);
-            self.unpaired.1.retain(|&tick, _| tick > state.tick);
+        while let Some(mut state) = self.unpaired.0.pop_front() {
+            if state.tick < self.base.truth_from() {
+                return Some(state);
+            }
+            state.truth = self.unpaired.1.remove(&state.tick);
+            if state.truth.is_some() {
+                self.unpaired.1.retain(|&tick, _| tick > state.tick);
+                return Some(state);
+            }
+            // Truths come in order: one that has not come before a later one is lost, and so is its state.
+            if self.unpaired.1.keys().next_back().is_none_or(|&last| last <= state.tick) {
+                self.unpaired.0.push_front(state);
+                return None;
+            }
         }
-        self.unpaired.0.pop_front()
+        None
     }
 
     /// Tells what came to be known of wheels and sensors; nothing as long as nothing was ever wrong.
@@ -203,6 +234,7 @@ impl GuidanceNode {
 
     /// Asks again, or holds the attitude when the answer is late; returns how long there is nothing to do.
     fn mind_question(&mut self) -> Result<Duration> {
+        let again = self.ask_again_after;
         let Some(question) = &mut self.question else { return Ok(ASK_AGAIN_AFTER) };
         if self.logic.wanted() != Some(question.message.task) {
             self.question = None;
@@ -210,11 +242,11 @@ impl GuidanceNode {
         }
         let (task, waited) = (question.message.task, question.asked.elapsed());
         if let Some(left) = self.deadline.checked_sub(waited) {
-            if question.last_asked.elapsed() >= ASK_AGAIN_AFTER {
+            if question.last_asked.elapsed() >= again {
                 question.last_asked = Instant::now();
                 self.points.publish(&question.message)?;
             }
-            return Ok(left.min(ASK_AGAIN_AFTER));
+            return Ok(left.min(again));
         }
         let hold = self.base.mission.hold_s;
         let text =
@@ -286,11 +318,16 @@ impl GuidanceNode {
 }
 
 impl LifecycleNode for GuidanceNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
     fn activate(&mut self) -> Result<()> {
         if std::mem::take(&mut self.rested) {
             // What was in hand counts as interrupted.
             self.logic = fresh(&self.base).taking_up(self.logic.kept(), None);
             (self.question, self.kept) = (None, None);
+            self.mind_faults();
         }
         Ok(())
     }
@@ -319,6 +356,10 @@ impl LifecycleNode for GuidanceNode {
         self.base.wait(ASK_AGAIN_AFTER)?;
         Ok(())
     }
+
+    fn end(self) -> Result<MissionNode> {
+        Ok(self.base)
+    }
 }
 
 /// Guidance that knows nothing of a flight yet.
@@ -327,7 +368,6 @@ fn fresh(base: &MissionNode) -> GuidanceLogic {
     GuidanceLogic::new((*base.model).clone(), base.horizon, period.ticks_ceil(mission.hold_s))
         .with_planning_delay(period.ticks_ceil(mission.plant.planning_delay_s))
         .watching(mission.plant.noisy())
-        .struck_at(base.strikes_at())
 }
 
 /// Guidance where the one before was, if there was one.

@@ -1,6 +1,5 @@
 //! The planner node's topics and alarms.
 
-use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
@@ -79,16 +78,16 @@ struct PlannerNode {
     now: Tick,
     /// When there is no planner, by order.
     away: Vec<Scheduled>,
-    base: Rc<MissionNode>,
+    base: MissionNode,
 }
 
 impl PlannerNode {
-    fn new(base: &Rc<MissionNode>, policies: &Policies, spec: &PlannerSpec, mode: &str) -> Result<Self> {
+    fn new(base: MissionNode, policies: &Policies, spec: &PlannerSpec, mode: &str) -> Result<Self> {
         let planner = GuardedPlanner::make(policies, spec, base.mission.seed);
         if let Some(warning) = policies.warning(spec, &base.mission.sim) {
             tracing::warn!("{warning}");
         }
-        let config = ApprovalConfig { mode: mode_at_start(base, mode)?, ..base.mission.approval.clone() };
+        let config = ApprovalConfig { mode: mode_at_start(&base, mode)?, ..base.mission.approval.clone() };
         let gate = Gate::new(&config, base.model.period);
         let planner = GatedPlanner { gate, planner };
         Ok(Self {
@@ -106,17 +105,19 @@ impl PlannerNode {
             last: None,
             now: Tick(0),
             fault_told: None,
-            away: base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect(),
-            base: Rc::clone(base),
+            away: away(&base),
+            base,
         })
     }
 
     fn work(&mut self) -> Result<()> {
+        self.take_fault_orders()?;
         while let Some(point) = self.points.take()? {
             if point.mission_over {
                 continue;
             }
             let tick = Tick(point.tick);
+            self.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| tick >= at) {
                 let _ = self.decisions.flush(FLUSH_TIMEOUT);
                 self.base.strike();
@@ -153,6 +154,13 @@ impl PlannerNode {
         }
         self.take_orders()?;
         self.tell_status()
+    }
+
+    fn take_fault_orders(&mut self) -> Result<()> {
+        if self.base.take_fault_orders()? {
+            self.away = away(&self.base);
+        }
+        Ok(())
     }
 
     /// What operators say; it counts from the next decision on.
@@ -227,6 +235,10 @@ impl PlannerNode {
 }
 
 impl LifecycleNode for PlannerNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
     fn turn(&mut self) -> Result<()> {
         self.work()?;
         self.base.wait(IDLE)?;
@@ -237,14 +249,24 @@ impl LifecycleNode for PlannerNode {
     fn rest(&mut self) -> Result<()> {
         while self.points.take()?.is_some() {}
         while self.upcoming.take()?.is_some() {}
+        self.take_fault_orders()?;
         self.take_orders()?;
         self.base.wait(IDLE)?;
         Ok(())
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        Ok(self.base)
     }
 }
 
 fn review(gate: &mut Gate, call: &msg::ReviewProposalRequest) -> Result<u64, String> {
     gate.review(call.proposal, call.approve, &call.actor).map_err(|error| error.to_string())
+}
+
+/// When there is no planner, by order.
+fn away(base: &MissionNode) -> Vec<Scheduled> {
+    base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect()
 }
 
 /// The mode that is asked for, else the one that operators set before this planner was started again, else the mission's.

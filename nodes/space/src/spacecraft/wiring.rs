@@ -1,7 +1,6 @@
 //! The spacecraft node's topics, pace and telemetry.
 
 use std::collections::VecDeque;
-use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -13,8 +12,10 @@ use swath_sim::time::Tick;
 
 use super::journal::Journal;
 use super::logic::SpacecraftLogic;
+use super::orders::OrderDesk;
 use super::telemetry::{self, Telemetry};
 use swath_mission::alarms::conditions::back;
+use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::Process;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::lifecycle::{self, LifecycleNode};
@@ -24,6 +25,8 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 /// In lockstep, states without an answer for so long are sent again.
 const RESEND_AFTER: Duration = Duration::from_millis(300);
+/// The same where messages are dropped by order, and in a paced mission.
+const RESEND_SOON_AFTER: Duration = Duration::from_millis(20);
 /// How long the last messages may take to reach their readers.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long the last state may take when the process is asked to end in flight.
@@ -97,47 +100,48 @@ struct SpacecraftNode {
     logic: SpacecraftLogic,
     clock: Publisher<Clock>,
     states: Publisher<SpacecraftState>,
-    /// There is one where the sensors are not exact.
-    truths: Option<Publisher<SpacecraftState>>,
+    /// Tells what the sensors do not, where they are not exact.
+    truths: Publisher<SpacecraftState>,
     commands: Subscription<WheelTorque>,
     telemetry: Telemetry,
+    orders: OrderDesk,
+    resend_after: Duration,
     unanswered: VecDeque<StateSample>,
     /// There is one where somebody would start the spacecraft again.
     journal: Option<Journal>,
     stage: Stage,
-    /// When a tick was flown last.
+    /// When a tick was flown, or a state sent again, last.
     progress: Instant,
     /// In a paced mission, when the next tick is due, and until when its command is waited for.
     due: Instant,
     latest: Instant,
     settings: Settings,
-    base: Rc<MissionNode>,
+    base: MissionNode,
 }
 
 impl SpacecraftNode {
-    fn new(base: &Rc<MissionNode>, settings: Settings) -> Result<Self> {
-        let lost = base.mission.faults.of(Process::Guidance, base.model.period);
-        let without = lost.iter().map(|(it, _)| (it.from, back(it))).collect();
-        let logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
-        let (journal, unanswered, logic) = take_up(base, logic.without_guidance(without))?;
+    fn new(mut base: MissionNode, settings: Settings) -> Result<Self> {
+        let orders = OrderDesk::new(&mut base)?;
+        let mut logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
+        logic.set_without_guidance(without_guidance(&base));
+        let (journal, unanswered, logic) = take_up(&base, logic)?;
         Ok(Self {
             logic,
             journal,
             unanswered,
             clock: base.node.publisher(&graph::CLOCK)?,
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
-            truths: match base.mission.tells_truth_apart(base.model.period) {
-                true => Some(base.node.publisher(&graph::SPACECRAFT_TRUTH)?),
-                false => None,
-            },
+            truths: base.node.publisher(&graph::SPACECRAFT_TRUTH)?,
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
-            telemetry: Telemetry::new(base)?,
+            telemetry: Telemetry::new(&base)?,
+            orders,
+            resend_after: resend_after(&base),
             stage: Stage::Waits { since: Instant::now() },
             progress: Instant::now(),
             due: Instant::now(),
             latest: Instant::now(),
             settings,
-            base: Rc::clone(base),
+            base,
         })
     }
 
@@ -200,18 +204,19 @@ impl SpacecraftNode {
     /// As fast as the nodes can go: a tick is integrated when its command has come.
     fn fly_in_lockstep(&mut self) -> Result<()> {
         self.take_commands()?;
+        self.take_orders()?;
         let before = self.logic.now();
         while self.logic.ready() && !self.logic.done() {
             self.advance()?;
         }
         if self.logic.now() > before {
             self.progress = Instant::now();
-        } else if self.progress.elapsed() > RESEND_AFTER {
+        } else if self.progress.elapsed() > self.resend_after {
             self.resend()?;
             self.progress = Instant::now();
         }
         if !self.logic.ready() {
-            self.base.wait(RESEND_AFTER)?;
+            self.base.wait(self.resend_after)?;
         }
         Ok(())
     }
@@ -221,14 +226,21 @@ impl SpacecraftNode {
     /// Where ticks are shorter than a decision may take, a late command is waited for, and the time lost is made up.
     fn fly_paced(&mut self) -> Result<()> {
         self.take_commands()?;
+        self.take_orders()?;
         let now = Instant::now();
         let wanted = if self.logic.ready() { self.due } else { self.latest };
         if now < wanted {
-            self.base.wait(wanted - now)?;
+            if !self.logic.ready() && self.progress.elapsed() >= RESEND_SOON_AFTER {
+                self.resend()?;
+                self.progress = Instant::now();
+            }
+            let left = wanted - now;
+            self.base.wait(if self.logic.ready() { left } else { left.min(RESEND_SOON_AFTER) })?;
             return Ok(());
         }
         self.due += self.tick();
         self.latest = self.due.max(now + COMMAND_PATIENCE);
+        self.progress = now;
         self.advance()
     }
 
@@ -256,6 +268,20 @@ impl SpacecraftNode {
         Ok(())
     }
 
+    /// Takes the faults that are ordered; those of wheels and sensors befall it at their ticks.
+    fn take_orders(&mut self) -> Result<()> {
+        let before = self.base.mission.faults.plan.len();
+        if !self.orders.take(&mut self.base, self.logic.now())? {
+            return Ok(());
+        }
+        let new = self.base.mission.faults.plan.iter().skip(before).copied().collect();
+        let new = FaultPlan { plan: new, random: 0 };
+        self.logic.suffer(new.vehicle(self.base.model.period));
+        self.logic.set_without_guidance(without_guidance(&self.base));
+        self.resend_after = resend_after(&self.base);
+        Ok(())
+    }
+
     fn publish(&mut self, sample: &StateSample) -> Result<()> {
         self.base.set_now(sample.tick);
         self.clock.publish(&Clock { clock: self.base.stamper.time(sample.tick) })?;
@@ -268,8 +294,8 @@ impl SpacecraftNode {
     }
 
     fn tell(&self, sample: &StateSample) -> Result<()> {
-        if let (Some(truths), Some(body)) = (&self.truths, sample.truth) {
-            truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
+        if let Some(body) = sample.truth {
+            self.truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
         }
         Ok(self.states.publish(&spacecraft_state(&self.base.stamper, sample))?)
     }
@@ -281,6 +307,10 @@ impl SpacecraftNode {
 }
 
 impl LifecycleNode for SpacecraftNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
     fn activate(&mut self) -> Result<()> {
         self.set_out();
         Ok(())
@@ -294,6 +324,7 @@ impl LifecycleNode for SpacecraftNode {
             Stage::Lingers => {
                 self.base.wait(FLUSH_TIMEOUT)?;
                 while self.commands.take()?.is_some() {}
+                self.take_orders()?;
             }
         }
         if self.stage == Stage::Flies && self.logic.done() {
@@ -305,17 +336,30 @@ impl LifecycleNode for SpacecraftNode {
     /// The clock stands.
     fn rest(&mut self) -> Result<()> {
         self.take_commands()?;
+        self.take_orders()?;
         self.base.wait(FLUSH_TIMEOUT)?;
         Ok(())
     }
 
-    fn end(self) -> Result<()> {
+    fn end(self) -> Result<MissionNode> {
         if self.stage == Stage::Flies {
             self.tell_missed()?;
             let _ = self.states.flush(LAST_FLUSH);
         }
-        Ok(())
+        Ok(self.base)
     }
+}
+
+/// In lockstep, after how long without an answer states are sent again.
+fn resend_after(base: &MissionNode) -> Duration {
+    let dropped = !base.mission.faults.drops(base.model.period).is_empty();
+    if dropped { RESEND_SOON_AFTER } else { RESEND_AFTER }
+}
+
+/// Between which states there is no guidance, by order.
+fn without_guidance(base: &MissionNode) -> Vec<(Tick, Tick)> {
+    let lost = base.mission.faults.of(Process::Guidance, base.model.period);
+    lost.iter().map(|(it, _)| (it.from, back(it))).collect()
 }
 
 /// The file of the commands that were flown.
