@@ -53,6 +53,9 @@ pub struct MissionNode {
     health: Mutex<Health>,
     /// Who is missing, as it was told last; nothing once everybody was there.
     missing: RefCell<Option<Vec<String>>>,
+    /// What was told of alarms, for another launcher, and to how many that was told.
+    told: RefCell<VecDeque<DiagnosticArray>>,
+    told_to: Cell<u64>,
     keep: Option<PathBuf>,
     /// What is ordered to befall this node, the next first, and how often something has already.
     ordered: VecDeque<(Scheduled, Failure)>,
@@ -61,6 +64,9 @@ pub struct MissionNode {
     process: Option<Process>,
     pub(crate) fault_orders: FaultOrders,
 }
+
+/// So much of what was told of alarms is told again to a launcher that takes over.
+const TOLD: usize = 1000;
 
 /// How grave an alarm is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,6 +124,8 @@ impl MissionNode {
             diagnostics,
             health,
             missing: RefCell::new(Some(Vec::new())),
+            told: RefCell::default(),
+            told_to: Cell::new(0),
             keep: (!keep.as_os_str().is_empty()).then_some(keep),
             ordered: VecDeque::new(),
             struck,
@@ -219,6 +227,9 @@ impl MissionNode {
     /// # Errors
     /// When it cannot be sent.
     pub fn tell_of_itself(&self) -> Result<()> {
+        if self.told_to.replace(self.node.taken_over()) != self.node.taken_over() {
+            self.told.borrow().iter().try_for_each(|array| self.diagnostics.publish(array))?;
+        }
         for notice in self.node.notices() {
             self.alarm(Severity::Warn, notice.trouble.name(), &notice.to_string())?;
             self.health().count_more(notice.trouble.name(), notice.count);
@@ -339,8 +350,17 @@ impl MissionNode {
         };
         let mut array = DiagnosticArray::default();
         array.header.stamp = stamp;
+        let is_alarm = name != HEALTH;
         array.status.push(status);
-        self.diagnostics.publish(&array).context("cannot raise an alarm")
+        self.diagnostics.publish(&array).context("cannot raise an alarm")?;
+        if is_alarm {
+            let mut told = self.told.borrow_mut();
+            if told.len() == TOLD {
+                told.pop_front();
+            }
+            told.push_back(array);
+        }
+        Ok(())
     }
 }
 

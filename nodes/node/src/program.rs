@@ -46,6 +46,7 @@ const COMMON: &[Parameter] = &[
     Parameter { name: "external", about: "Nodes whose place another program takes: a list of names." },
     Parameter { name: "keep", about: "Folder for what the node needs to go on when it is started again." },
     Parameter { name: "orphaned_s", about: "How long it goes on without its launcher [s]; 0: there is none." },
+    Parameter { name: "signs", about: "Where a launcher listens that takes the node over; empty: nowhere." },
     Parameter { name: "struck", about: "Faults ordered for this node that have befallen it already." },
     Parameter { name: "memory_limit_mb", about: "Memory that the process may have [10^6 B]; 0 without bound." },
     AUTOSTART,

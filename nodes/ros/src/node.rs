@@ -1,6 +1,7 @@
 //! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -31,7 +32,7 @@ use crate::names::{Names, dds_service, dds_topic, dds_type};
 use crate::node_services::NodeServices;
 use crate::notices::Notice;
 use crate::params::{Parameters, Spec};
-use crate::pulse::{Pulse, SIGN_EVERY, Sign, say};
+use crate::pulse::{Pulse, SIGN_EVERY};
 use crate::qos::{Profile, QosProfile, with_depth};
 use crate::replies::AllReplies;
 use crate::roster::{Direction, Roster};
@@ -452,9 +453,15 @@ impl Node {
         self.pulse.orphaned()
     }
 
+    /// How often another launcher has taken this node over.
+    #[must_use]
+    pub fn taken_over(&self) -> u64 {
+        self.pulse.taken_over()
+    }
+
     /// Tells the launcher that what was ordered befalls this node now; with its number among those, from 0.
     pub fn tell_struck(&self, number: u64) {
-        say(&Sign::Struck(number));
+        self.pulse.tell_struck(number);
     }
 
     /// What has come on each topic that this node subscribes to.
@@ -505,7 +512,10 @@ fn declare_pulse(parameters: &Parameters) -> Result<Pulse, RosError> {
     let text =
         "How long the node goes on when the launcher, which listens on its stdout, is gone [s]; 0: none listens.";
     let limit = parameters.declare(Spec::new("orphaned_s", 0.0, text).in_range(0.0..=1e9).read_only())?;
-    Ok(Pulse::new((limit > 0.0).then(|| Duration::from_secs_f64(limit))))
+    let text = "Where a launcher listens that takes the node over when its own is gone; empty: nowhere.";
+    let next = PathBuf::from(parameters.declare(Spec::new("signs", String::new(), text).read_only())?);
+    let next = (!next.as_os_str().is_empty()).then_some(next);
+    Ok(Pulse::new((limit > 0.0).then(|| Duration::from_secs_f64(limit)), next))
 }
 
 /// Declares the parameter that bounds the memory of this process, and bounds it.

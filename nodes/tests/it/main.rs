@@ -34,4 +34,5 @@ mod storm;
 #[allow(dead_code, reason = "others use more of it")]
 mod stranger;
 mod supervised;
+mod taken_over;
 mod two_satellites;

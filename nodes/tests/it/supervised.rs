@@ -49,13 +49,13 @@ pub fn until_it_flies(out: &Path) {
     common::until("more tasks", || (tasks(out).len() > before + 2).then_some(()));
 }
 
-fn launch(domain: &str, mission: &Path, out: &Path) -> Command {
+pub fn launch(domain: &str, mission: &Path, out: &Path) -> Command {
     let mut launch = common::command("swath", domain);
     launch.arg("launch").arg(mission).arg("--out").arg(out);
     launch
 }
 
-fn validate(bag: &Path) -> String {
+pub fn validate(bag: &Path) -> String {
     let mut validate = common::command("swath-bag", "0");
     common::succeed(validate.arg("validate").arg(bag))
 }

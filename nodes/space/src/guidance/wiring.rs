@@ -72,6 +72,9 @@ struct GuidanceNode {
     status: Publisher<msg::GuidanceStatus>,
     phases: Publisher<msg::TaskPhase>,
     aborts: Subscription<msg::TaskAbort>,
+    /// The last decision point, and how many launchers were told of it.
+    last_point: Option<msg::DecisionPoint>,
+    told_to: u64,
     /// Task and whether it images, as they were told last.
     phase_told: Option<(u64, bool)>,
     status_every: u64,
@@ -113,6 +116,8 @@ impl GuidanceNode {
             status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
             phases: base.node.publisher(&graph::TASK_PHASE)?,
             aborts: base.node.subscription(&graph::TASK_ABORT)?,
+            last_point: None,
+            told_to: 0,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             pace,
@@ -149,6 +154,7 @@ impl GuidanceNode {
     }
 
     fn work(&mut self) -> Result<Duration> {
+        self.tell_another_launcher()?;
         while let Some(message) = self.aborts.take()? {
             if self.logic.on_abort(message.task) {
                 tracing::info!("task {} is given up: {}", message.task, message.reason);
@@ -164,6 +170,17 @@ impl GuidanceNode {
             self.take_task(&message)?;
         }
         self.mind_question()
+    }
+
+    /// A launcher that takes over learns how far the mission is; the others only answer again.
+    fn tell_another_launcher(&mut self) -> Result<()> {
+        let launchers = self.base.node.taken_over();
+        if std::mem::replace(&mut self.told_to, launchers) != launchers
+            && let Some(point) = &self.last_point
+        {
+            self.points.publish(point)?;
+        }
+        Ok(())
     }
 
     fn take_states(&mut self) -> Result<()> {
@@ -268,6 +285,7 @@ impl GuidanceNode {
                 Effect::Decide(point) => {
                     let message = messages::decision_point(&self.base.stamper, &point);
                     self.points.publish(&message)?;
+                    self.last_point = Some(message.clone());
                     let now = Instant::now();
                     self.question = (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
                     self.hold_without_planner(point.state.tick)?;
