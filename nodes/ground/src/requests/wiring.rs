@@ -27,6 +27,7 @@ use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
 use swath_mission::requests::refusal::Refusal;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity};
 use swath_node::orders::{operator_action, order_of};
 use swath_node::program::{Parameter, Program};
@@ -54,14 +55,11 @@ const PROGRAM: Program = Program {
 /// # Errors
 /// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = RequestNode::new(MissionNode::start(&PROGRAM)?)?;
-    let outcome = node.fly();
-    let RequestNode { mut writer, reader, .. } = node;
-    // The last connection to close the store leaves one file.
-    drop(reader);
-    // What was taken is written, also when the node ends on an error.
-    writer.finish()?;
-    outcome
+    let base = MissionNode::start(&PROGRAM)?;
+    let spec = Spec::new(STORE.name, String::new(), STORE.about);
+    let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, |base| RequestNode::new(base, path.clone()))
 }
 
 struct RequestNode {
@@ -101,10 +99,7 @@ struct RequestNode {
 }
 
 impl RequestNode {
-    fn new(base: MissionNode) -> Result<Self> {
-        let spec = Spec::new(STORE.name, String::new(), STORE.about);
-        let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
-        base.node.parameters().check_given()?;
+    fn new(base: MissionNode, path: PathBuf) -> Result<Self> {
         let (path, temporary) = if path.as_os_str().is_empty() {
             tracing::warn!("requests do not outlast this process: parameter `store` is not set");
             let folder = tempfile::tempdir().context("cannot make a temporary store")?;
@@ -112,7 +107,7 @@ impl RequestNode {
         } else {
             (path, None)
         };
-        let lock = StoreLock::take(&path, base.node.epoch() > 0)?;
+        let lock = StoreLock::take(&path, base.goes_on())?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let logic = take_up(&base, &mut store)?;
@@ -161,13 +156,6 @@ impl RequestNode {
         Ok(())
     }
 
-    fn fly(&mut self) -> Result<()> {
-        while !self.base.shutdown.asked() {
-            self.turn()?;
-        }
-        Ok(())
-    }
-
     /// The questions of guidance, and what is answered.
     fn take_points(&mut self) -> Result<Vec<Outgoing>> {
         let mut outgoing = Vec::new();
@@ -181,7 +169,8 @@ impl RequestNode {
             self.mind_room(Tick(point.tick))?;
             let offer = self.offer(&point)?;
             outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
-            outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
+            // One who rests offers nothing; guidance asks again.
+            outgoing.extend(offer.filter(|_| self.desk.open).map(|offer| Outgoing::Offer(Box::new(offer))));
             if point.mission_over {
                 outgoing.push(Outgoing::Summary);
             }
@@ -189,7 +178,7 @@ impl RequestNode {
         Ok(outgoing)
     }
 
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<()> {
         let mut outgoing = self.take_points()?;
         while let Some(task) = self.tasks.take()? {
             if let Some(flown) = messages::in_flight(&task) {
@@ -205,9 +194,12 @@ impl RequestNode {
         }
         self.mind_room(Tick(0))?;
         while let Some(request) = self.requests.take()? {
-            if self.writer.full() {
-                self.base.alarm(Severity::Warn, "request refused", &Refusal::StoreFull.to_string())?;
-            } else if let Err(refusal) = self.logic.submit(order_of(&request), self.logic.now()) {
+            let now = self.logic.now();
+            let taken = match self.writer.full() {
+                true => Err(Refusal::StoreFull),
+                false => self.desk.admit(1).and_then(|()| self.logic.submit(order_of(&request), now)),
+            };
+            if let Err(refusal) = taken {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
@@ -242,6 +234,11 @@ impl RequestNode {
             }
         };
         if now < self.logic.now() && self.last.is_none() {
+            if self.base.goes_on() {
+                // A reader that comes late is sent what the writer still holds.
+                tracing::debug!("a decision point of {now} is old");
+                return Ok(None);
+            }
             let known = self.logic.now();
             bail!("store {} is of a flight that is at {known}, this one is at {now}", self.reader.path().display());
         }
@@ -376,6 +373,39 @@ impl RequestNode {
             self.aborts.publish(&messages::task_abort(&self.base.stamper, self.logic.now(), abort, reason))?;
         }
         Ok(())
+    }
+}
+
+impl LifecycleNode for RequestNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn activate(&mut self) -> Result<()> {
+        self.desk.open = true;
+        Ok(())
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        self.desk.open = false;
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    /// Nothing is taken and nothing offered; what ends is written down, and questions are answered.
+    fn rest(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        let Self { mut writer, reader, base, .. } = self;
+        // The last connection to close the store leaves one file.
+        drop(reader);
+        writer.finish()?;
+        Ok(base)
     }
 }
 
