@@ -195,7 +195,8 @@ impl Fleet {
     /// Whether every process that is not given up is there.
     pub fn is_whole(&self) -> bool {
         let there = |member: &Member| member.running.is_some() && !member.lost;
-        self.members.iter().all(|member| member.watch.given_up() || member.no_room || there(member))
+        let waits_for_room = |member: &Member| member.running.is_none() && member.no_room;
+        self.members.iter().all(|member| member.watch.given_up() || waits_for_room(member) || there(member))
     }
 
     /// Simulated time as the nodes know it [ns].

@@ -86,6 +86,8 @@ struct RequestNode {
     writer: Writer,
     /// Whether there was no room, as it was told last.
     full_told: bool,
+    /// Whether there is no room because that was ordered.
+    full_ordered: bool,
     /// When there is no room, by order, and the time; where nothing is ordered, neither.
     full_by_order: Vec<Scheduled>,
     clock: Option<Subscription<Clock>>,
@@ -130,6 +132,7 @@ impl RequestNode {
             written: logic.progress(),
             writer: Writer::start(store, base.node.signal().clone()),
             full_told: false,
+            full_ordered: false,
             full_by_order: Vec::new(),
             clock: None,
             clock_at: Tick(0),
@@ -338,7 +341,10 @@ impl RequestNode {
         let ordered = self.full_by_order.iter().any(|it| it.from <= now && now < it.until);
         self.writer.set_full_by_order(ordered);
         let full = self.writer.full();
-        if full != self.full_told && !(full && ordered) {
+        // Room is looked for from time to time: what was ordered may last a little longer.
+        self.full_ordered = full && (ordered || self.full_ordered);
+        let full = full && !self.full_ordered;
+        if full != self.full_told {
             self.full_told = full;
             let text = if full { Refusal::StoreFull.to_string() } else { "there is room".to_owned() };
             let at = self.logic.now().max(self.clock_at);
