@@ -94,7 +94,7 @@ function Filters() {
       <label>
         <input type="checkbox" checked={onlyInView.value} onChange={(event) => (onlyInView.value = event.currentTarget.checked)} /> in map view
       </label>
-      <span>{rows.value.length}</span>
+      <span title="requests that are shown">{rows.value.length}</span>
     </div>
   );
 }
