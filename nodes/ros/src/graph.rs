@@ -11,11 +11,11 @@ use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
-    AcknowledgeAlarm, AlarmEvent, CancelStrips, Decision, DecisionPoint, GetLimits, GetStrip, GuidanceStatus,
-    ImagingTask, ListAlarms, ListHistory, ListStrips, OperatorAction, PlannerStatus, PreviewStrip, ReplaceStrip,
-    RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms,
-    StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips,
-    WheelTorque,
+    AcknowledgeAlarm, AlarmEvent, CancelStrips, Decision, DecisionPoint, FaultOrders, GetLimits, GetStrip,
+    GuidanceStatus, ImagingTask, ListAlarms, ListHistory, ListStrips, OperatorAction, OrderFault, PlannerStatus,
+    PreviewStrip, ReplaceStrip, RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm,
+    SpacecraftState, StandingAlarms, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult,
+    UnshelveAlarm, UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -48,6 +48,16 @@ pub const OPERATOR: &str = "operator";
 
 /// The nodes that fly a mission.
 pub const FLIGHT_NODES: [&str; 4] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER];
+
+/// Topics whose messages come again as long as they are not answered: of these some may be dropped by order.
+pub const COME_AGAIN: [Entry; 6] = [
+    SPACECRAFT_STATE.entry,
+    SPACECRAFT_TRUTH.entry,
+    WHEEL_TORQUE.entry,
+    DECISION_POINT.entry,
+    UPCOMING_STRIPS.entry,
+    PLANNER_TASK.entry,
+];
 
 /// The nodes that count only what other nodes of their mission say, and wait for nobody else.
 pub const MEMBERS: [&str; 5] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER, LAUNCHER];
@@ -129,7 +139,7 @@ pub const TASK_ABORT: Topic<TaskAbort> =
     Topic::new("requests/abort", Profile::Command, &[REQUEST_MANAGER], &[GUIDANCE]);
 /// What the planner may do by itself, and what it proposes.
 pub const PLANNER_STATUS: Topic<PlannerStatus> =
-    Topic::new("planner/status", Profile::Latched, &[PLANNER], &[OPERATOR]);
+    Topic::new("planner/status", Profile::Latched, &[PLANNER], &[LAUNCHER, OPERATOR]);
 /// The next task.
 pub const PLANNER_TASK: Topic<ImagingTask> =
     Topic::new("planner/task", Profile::Command, &[PLANNER], &[GUIDANCE, REQUEST_MANAGER]);
@@ -157,6 +167,9 @@ pub const STANDING_ALARMS: Topic<StandingAlarms> =
     Topic::new("alarms/standing", Profile::Latched, &[LAUNCHER], &[OPERATOR]);
 /// What happens to alarms.
 pub const ALARM_EVENTS: Topic<AlarmEvent> = Topic::new("alarms/events", Profile::Event, &[LAUNCHER], &[OPERATOR]);
+/// Faults that were ordered while the mission flies.
+pub const FAULT_ORDERS: Topic<FaultOrders> =
+    Topic::new("faults/orders", Profile::Latched, &[SPACECRAFT], &[GUIDANCE, REQUEST_MANAGER, PLANNER, LAUNCHER]);
 /// How many strip requests are in which state.
 pub const REQUEST_SUMMARY: Topic<RequestSummary> =
     Topic::new("requests/summary", Profile::Latched, &[REQUEST_MANAGER], &[LAUNCHER, OPERATOR]);
@@ -203,6 +216,8 @@ pub const ACKNOWLEDGE_ALARM: Service<AcknowledgeAlarm> = Service::new("alarms/ac
 pub const SHELVE_ALARM: Service<ShelveAlarm> = Service::new("alarms/shelve", &[LAUNCHER], &[OPERATOR]);
 /// An operator wants to be told of an alarm again.
 pub const UNSHELVE_ALARM: Service<UnshelveAlarm> = Service::new("alarms/unshelve", &[LAUNCHER], &[OPERATOR]);
+/// Something is to fail.
+pub const ORDER_FAULT: Service<OrderFault> = Service::new("faults/order", &[SPACECRAFT], &[OPERATOR]);
 /// All alarms that are not normal.
 pub const LIST_ALARMS: Service<ListAlarms> = Service::new("alarms/list", &[LAUNCHER], &[OPERATOR]);
 
@@ -231,6 +246,7 @@ pub const TOPICS: &[Entry] = &[
     PLANNER_ACTIONS.entry,
     STANDING_ALARMS.entry,
     ALARM_EVENTS.entry,
+    FAULT_ORDERS.entry,
     DIAGNOSTICS.entry,
     ROSOUT.entry,
     PARAMETER_EVENTS.entry,
@@ -253,6 +269,7 @@ pub const SERVICES: &[Entry] = &[
     SHELVE_ALARM.entry,
     UNSHELVE_ALARM.entry,
     LIST_ALARMS.entry,
+    ORDER_FAULT.entry,
 ];
 
 /// The table as a Mermaid flow chart: nodes are boxes, topics are arrows between them.
@@ -355,9 +372,14 @@ mod tests {
     planner -->|planner/task| guidance
     planner -->|planner/task| request_manager
     planner -->|planner/decision| launcher
+    planner -->|planner/status| launcher
     planner -->|planner/status| operator
     launcher -->|alarms/standing| operator
     launcher -->|alarms/events| operator
+    spacecraft -->|faults/orders| guidance
+    spacecraft -->|faults/orders| request_manager
+    spacecraft -->|faults/orders| planner
+    spacecraft -->|faults/orders| launcher
     operator <-.->|requests/submit| request_manager
     operator <-.->|requests/cancel| request_manager
     operator <-.->|requests/replace| request_manager
@@ -373,6 +395,7 @@ mod tests {
     operator <-.->|alarms/shelve| launcher
     operator <-.->|alarms/unshelve| launcher
     operator <-.->|alarms/list| launcher
+    operator <-.->|faults/order| spacecraft
     FLIGHT([every topic]) --> recorder
 ";
         assert_eq!(mermaid(), expected);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs as msg;
 use swath_node::messages::decision_point::situation;
 use swath_node::messages::task_result::task_record;
@@ -19,9 +20,13 @@ use super::messages;
 use super::outgoing::Outgoing;
 use super::store::{Durability, Store};
 use super::writer::Writer;
+use swath_mission::alarms::conditions::{Report, STORE_FULL};
+use swath_mission::faults::What;
+use swath_mission::faults::plan::Scheduled;
 use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
+use swath_mission::requests::refusal::Refusal;
 use swath_node::node::{MissionNode, Severity};
 use swath_node::orders::{operator_action, order_of};
 use swath_node::program::{Parameter, Program};
@@ -81,6 +86,12 @@ struct RequestNode {
     unheard: Vec<Arc<Vec<Entry>>>,
     written: Progress,
     writer: Writer,
+    /// Whether there was no room, as it was told last.
+    full_told: bool,
+    /// When there is no room, by order, and the time; where nothing is ordered, neither.
+    full_by_order: Vec<Scheduled>,
+    clock: Option<Subscription<Clock>>,
+    clock_at: Tick,
     reader: Store,
     base: MissionNode,
     /// Nobody else writes the store.
@@ -105,7 +116,7 @@ impl RequestNode {
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let logic = take_up(&base, &mut store)?;
-        Ok(Self {
+        let mut node = Self {
             desk: Desk::new(&base.node)?,
             points: base.node.subscription(&graph::DECISION_POINT)?,
             tasks: base.node.subscription(&graph::PLANNER_TASK)?,
@@ -123,12 +134,31 @@ impl RequestNode {
             unheard: Vec::new(),
             written: logic.progress(),
             writer: Writer::start(store, base.node.signal().clone()),
+            full_told: false,
+            full_by_order: Vec::new(),
+            clock: None,
+            clock_at: Tick(0),
             reader,
             logic,
             base,
             _lock: lock,
             _temporary: temporary,
-        })
+        };
+        node.mind_faults()?;
+        Ok(node)
+    }
+
+    fn take_fault_orders(&mut self) -> Result<()> {
+        if self.base.take_fault_orders()? { self.mind_faults() } else { Ok(()) }
+    }
+
+    /// What follows from the faults by order, those that were ordered on the way too.
+    fn mind_faults(&mut self) -> Result<()> {
+        self.full_by_order = self.base.mission.faults.when(What::StoreFull, self.base.model.period);
+        if !self.full_by_order.is_empty() && self.clock.is_none() {
+            self.clock = Some(self.base.node.subscription(&graph::CLOCK)?);
+        }
+        Ok(())
     }
 
     fn fly(&mut self) -> Result<()> {
@@ -138,13 +168,17 @@ impl RequestNode {
         Ok(())
     }
 
-    fn turn(&mut self) -> Result<()> {
+    /// The questions of guidance, and what is answered.
+    fn take_points(&mut self) -> Result<Vec<Outgoing>> {
         let mut outgoing = Vec::new();
+        self.take_fault_orders()?;
         while let Some(point) = self.points.take()? {
+            self.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
                 let _ = self.results.flush(FLUSH_TIMEOUT);
                 self.base.strike();
             }
+            self.mind_room(Tick(point.tick))?;
             let offer = self.offer(&point)?;
             outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
             outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
@@ -152,6 +186,11 @@ impl RequestNode {
                 outgoing.push(Outgoing::Summary);
             }
         }
+        Ok(outgoing)
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        let mut outgoing = self.take_points()?;
         while let Some(task) = self.tasks.take()? {
             if let Some(flown) = messages::in_flight(&task) {
                 self.logic.on_task(flown);
@@ -164,12 +203,19 @@ impl RequestNode {
                 Err(error) => self.base.alarm(Severity::Error, "phase refused", &error.to_string())?,
             }
         }
+        self.mind_room(Tick(0))?;
         while let Some(request) = self.requests.take()? {
-            if let Err(refusal) = self.logic.submit(order_of(&request), self.logic.now()) {
+            if self.writer.full() {
+                self.base.alarm(Severity::Warn, "request refused", &Refusal::StoreFull.to_string())?;
+            } else if let Err(refusal) = self.logic.submit(order_of(&request), self.logic.now()) {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
-        self.desk.take(&mut self.logic, &self.base, &mut outgoing)?;
+        if self.writer.full() {
+            self.desk.refuse(&self.logic, &self.base, &self.reader)?;
+        } else {
+            self.desk.take(&mut self.logic, &self.base, &mut outgoing)?;
+        }
         self.desk.work(&mut self.logic, SLICE, &mut outgoing);
         self.hand_over(outgoing);
         self.tell_aborts()?;
@@ -252,7 +298,18 @@ impl RequestNode {
     /// Sends what is written.
     fn release(&mut self) -> Result<()> {
         let written = self.writer.written();
+        let mut ready: Vec<Outgoing> = Vec::new();
         while let Some((_, outgoing)) = self.outbox.pop_front_if(|(number, _)| *number <= written) {
+            ready.push(outgoing);
+        }
+        if self.writer.full() {
+            // The satellite does not wait for room: it flies on with what nobody but it was promised.
+            let (flies, waits) = self.outbox.drain(..).partition(|(_, outgoing)| outgoing.is_of_flight());
+            self.outbox = waits;
+            let flies: VecDeque<_> = flies;
+            ready.extend(flies.into_iter().map(|(_, outgoing)| outgoing));
+        }
+        for outgoing in ready {
             match outgoing {
                 Outgoing::Offer(offer) => {
                     self.upcoming.publish(&offer)?;
@@ -271,6 +328,24 @@ impl RequestNode {
                 }
                 answer => self.desk.answer(answer, &self.logic, &self.base, &self.reader)?,
             }
+        }
+        Ok(())
+    }
+
+    /// Whether there is room to write: by order, and as it is. What is ordered is told of by the plan.
+    fn mind_room(&mut self, tick: Tick) -> Result<()> {
+        while let Some(clock) = self.clock.as_ref().map_or(Ok(None), Subscription::take)? {
+            self.clock_at = self.clock_at.max(self.base.stamper.tick_from(&clock.clock));
+        }
+        let now = self.clock_at.max(tick);
+        let ordered = self.full_by_order.iter().any(|it| it.from <= now && now < it.until);
+        self.writer.set_full_by_order(ordered);
+        let full = self.writer.full();
+        if full != self.full_told && !(full && ordered) {
+            self.full_told = full;
+            let text = if full { Refusal::StoreFull.to_string() } else { "there is room".to_owned() };
+            let at = self.logic.now().max(self.clock_at);
+            self.base.condition(&Report::new(at, graph::REQUEST_MANAGER, STORE_FULL, full, text))?;
         }
         Ok(())
     }

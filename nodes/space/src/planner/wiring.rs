@@ -106,17 +106,19 @@ impl PlannerNode {
             last: None,
             now: Tick(0),
             fault_told: None,
-            away: base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect(),
+            away: away(&base),
             base,
         })
     }
 
     fn turn(&mut self) -> Result<()> {
+        self.take_fault_orders()?;
         while let Some(point) = self.points.take()? {
             if point.mission_over {
                 continue;
             }
             let tick = Tick(point.tick);
+            self.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| tick >= at) {
                 let _ = self.decisions.flush(FLUSH_TIMEOUT);
                 self.base.strike();
@@ -154,6 +156,13 @@ impl PlannerNode {
         self.take_orders()?;
         self.tell_status()?;
         self.base.wait(IDLE)?;
+        Ok(())
+    }
+
+    fn take_fault_orders(&mut self) -> Result<()> {
+        if self.base.take_fault_orders()? {
+            self.away = away(&self.base);
+        }
         Ok(())
     }
 
@@ -224,6 +233,11 @@ impl PlannerNode {
         self.last = Some(task);
         Ok(())
     }
+}
+
+/// When there is no planner, by order.
+fn away(base: &MissionNode) -> Vec<Scheduled> {
+    base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect()
 }
 
 /// The mode that is asked for, else the one that operators set before this planner was started again, else the mission's.
