@@ -11,8 +11,8 @@ mod clients;
 mod common;
 mod console;
 mod datagrams;
-mod drill;
 mod described;
+mod drill;
 mod examples;
 mod fault_orders;
 #[path = "../../examples/common/flight.rs"]
