@@ -74,9 +74,6 @@ impl MissionNode {
             bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
         }
         let mission = Mission::read(&path)?;
-        if mission.link.is_some() {
-            bail!("a mission with [link] flies in one process only: swath launch {} --in-process", path.display());
-        }
         let model = Arc::new(mission.model()?);
         let keep =
             Spec::new("keep", String::new(), "Folder for what the node needs to go on when it is started again.");

@@ -28,6 +28,8 @@ enum Command {
     Planner(operate::PlannerArgs),
     /// Say what is wrong, and what operators know of it.
     Alarms(operate::AlarmsArgs),
+    /// Say how the radio of a flying mission stands.
+    Link(operate::LinkArgs),
     /// Say when stations see the satellite of a mission, from its file alone.
     Passes(passes::PassesArgs),
     /// Show a flying or a recorded mission as a page in a browser.
@@ -58,6 +60,7 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
         Command::Alarms(args) => operate::run_alarms(&args, ros)?,
+        Command::Link(args) => operate::run_link(&args, ros)?,
         Command::Passes(args) => passes::run(&args)?,
         Command::Console(args) => swath_console::run(&args, ros)?,
         Command::Bridge(args) => swath_bridge::run(&args, ros)?,

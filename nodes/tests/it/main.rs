@@ -20,6 +20,7 @@ mod operators_day;
 mod parity;
 mod peer;
 mod pins;
+mod radio;
 mod readme;
 mod recorded;
 mod storm;

@@ -13,7 +13,7 @@ use crate::common;
 const NODES: [&str; 5] = ["swath-spacecraft", "swath-guidance", "swath-planner", "swath-requests", "swath-bag"];
 
 /// The process of a program that works for the mission in a folder.
-fn process(program: &str, out: &Path) -> Option<Pid> {
+pub fn process(program: &str, out: &Path) -> Option<Pid> {
     let out = out.display().to_string();
     let of = |entry: std::io::Result<std::fs::DirEntry>| {
         let pid: i32 = entry.ok()?.file_name().to_str()?.parse().ok()?;

@@ -1,4 +1,4 @@
-//! A mission over DDS: four nodes and the recorder, each a process of its own.
+//! A mission over DDS: the nodes that fly and the recorder, each a process of its own.
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -25,9 +25,12 @@ use swath_mission::fallback::{Deciders, Policies, fallback, made_instead};
 use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::Mission;
+use swath_mission::link::ground::Ground;
+use swath_mission::link::response::LinkSummary;
 use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
 use swath_mission::task_log::TaskLog;
 
+use crate::requests::ground_end::GroundEnd;
 use crate::requests::orders::{Orders, stored};
 use crate::requests::store::Store;
 
@@ -54,6 +57,8 @@ pub struct Wishes {
     pub record: bool,
     /// Where the console listens, if there is one.
     pub console: Option<SocketAddr>,
+    /// Whether there is a radio between ground and satellite.
+    pub radio: bool,
 }
 
 /// Flies a mission over DDS; an error where nothing was flown.
@@ -88,7 +93,7 @@ pub fn fly(
         true => count_messages(&output.path().join("bag")),
         false => Ok(0),
     });
-    let ended = fleet.stop(&graph::FLIGHT_NODES);
+    let ended = fleet.stop(&graph::ALL_FLIGHT_NODES);
     drop(fleet);
     let (messages_recorded, unrecorded) = match recorded {
         Ok(count) => (count, None),
@@ -98,6 +103,8 @@ pub fn fly(
     let failure = watched.err().or(unrecorded).or(ended.err());
     let safe_mode = launcher.safe_mode.take();
     let model = mission.model()?;
+    let ground = ground(mission, &model, output)?;
+    output.write_ways(&ground.iter().flat_map(Ground::lines).collect::<Vec<_>>())?;
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
         decided_instead: made_instead(launcher.deciders.clone(), &mission.planner),
@@ -112,9 +119,16 @@ pub fn fly(
         nodes,
         orders: orders(output),
         resources: None,
-        link: None,
+        link: ground.map(|ground| LinkSummary::new(ground.lines(), model.period)),
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
+}
+
+/// The ground as the request manager left it, in a mission with a radio.
+fn ground(mission: &Mission, model: &Model, output: &OutputFolder) -> Result<Option<Ground>> {
+    let Some(mut end) = GroundEnd::new(mission, model)? else { return Ok(None) };
+    end.take_up(&Store::open_read_only(&output.path().join(STORE))?)?;
+    Ok(Some(end.into_ground()))
 }
 
 /// What became of orders, from the store that the request manager left.
@@ -185,10 +199,15 @@ fn start_nodes(
     };
     let store = format!("store:={}", text(&output.path().join(STORE))?);
     fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
-    for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
+    let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
+    let mut others = vec![(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")];
+    if wishes.radio {
+        peers.extend(graph::RADIO_NODES);
+        others.extend([(graph::CATALOGUE, "swath-catalogue"), (graph::LINK, "swath-link")]);
+    }
+    for (name, program) in others {
         fleet.start(name, program, &words(&[]))?;
     }
-    let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
     if wishes.record {
         peers.push(graph::RECORDER);
     }
@@ -424,7 +443,7 @@ impl Launcher {
     /// and without another one the mission ends.
     fn give_up(&mut self, fleet: &mut Fleet, node: &str, tick: Tick, reason: String) -> Result<()> {
         tracing::error!("{reason}");
-        if !graph::FLIGHT_NODES.contains(&node) {
+        if !graph::ALL_FLIGHT_NODES.contains(&node) {
             return Ok(());
         }
         let key = Key::new(graph::LAUNCHER, "safe mode");

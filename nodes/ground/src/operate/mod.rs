@@ -5,6 +5,7 @@ mod client;
 mod cover;
 mod export;
 mod files;
+mod link;
 mod orders;
 mod planner;
 mod query;
@@ -14,6 +15,7 @@ mod submit;
 mod watch;
 
 pub use alarms::{AlarmsArgs, run as run_alarms};
+pub use link::{LinkArgs, run as run_link};
 pub use planner::{PlannerArgs, run as run_planner};
 
 use anyhow::Result;

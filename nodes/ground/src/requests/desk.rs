@@ -11,9 +11,11 @@ use swath_ros::{Node, RequestId, RosError, Server, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
+use super::book::Book;
 use super::messages;
 use super::outgoing::Outgoing;
 use super::store::Store;
+use super::ways;
 use swath_mission::requests::logic::RequestLogic;
 use swath_mission::requests::query::page_length;
 use swath_mission::requests::refusal::{BATCH_MAX, Refusal, check_batch};
@@ -29,6 +31,7 @@ pub(super) struct Desk {
     list: Server<msg::ListStrips>,
     history: Server<msg::ListHistory>,
     preview: Server<msg::PreviewStrip>,
+    ways: Server<msg::ListWays>,
     limits: Server<msg::GetLimits>,
     /// Submissions that are being taken, a slice at a time.
     jobs: VecDeque<Job>,
@@ -52,18 +55,14 @@ impl Desk {
             list: node.server(&graph::LIST_STRIPS)?,
             history: node.server(&graph::LIST_HISTORY)?,
             preview: node.server(&graph::PREVIEW_STRIP)?,
+            ways: node.server(&graph::LIST_WAYS)?,
             limits: node.server(&graph::GET_LIMITS)?,
             jobs: VecDeque::new(),
         })
     }
 
     /// Takes the calls that have come. Those that ask without changing anything are answered at once.
-    pub(super) fn take(
-        &mut self,
-        logic: &mut RequestLogic,
-        base: &MissionNode,
-        outgoing: &mut Vec<Outgoing>,
-    ) -> Result<()> {
+    pub(super) fn take(&mut self, book: &mut Book, base: &MissionNode, outgoing: &mut Vec<Outgoing>) -> Result<()> {
         while let Some((id, call)) = next(&self.submit)? {
             match check_batch(call.requests.len()) {
                 Ok(()) => {
@@ -83,24 +82,23 @@ impl Desk {
         }
         while let Some((id, call)) = next(&self.cancel)? {
             let cancel = |&number: &u64| {
-                let result = logic.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
-                messages::submit_result(logic, true, result)
+                let result = book.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
+                messages::submit_result(book.logic(), true, result)
             };
             let (results, reason_code, reason) = each(&call.ids, cancel);
             outgoing.push(Outgoing::Cancelled(id, msg::CancelStripsResponse { results, reason_code, reason }));
         }
         while let Some((id, call)) = next(&self.replace)? {
-            let before = logic.len();
-            let result = logic.replace(StripId(call.id), order_of(&call.request), logic.now());
-            let result = messages::submit_result(logic, logic.len() == before, result);
+            let before = book.logic().len();
+            let result = book.replace(StripId(call.id), order_of(&call.request));
+            let result = messages::submit_result(book.logic(), book.logic().len() == before, result);
             outgoing.push(Outgoing::Replaced(id, msg::ReplaceStripResponse { result }));
         }
         while let Some((id, call)) = next(&self.review)? {
             let decide = |&number: &u64| {
                 let review = messages::review(call.action);
-                let decided =
-                    review.and_then(|review| logic.review(StripId(number), review, &call.actor, &call.reason));
-                messages::submit_result(logic, true, decided.map(|()| StripId(number)))
+                let decided = review.and_then(|review| book.review(StripId(number), review, &call.actor, &call.reason));
+                messages::submit_result(book.logic(), true, decided.map(|()| StripId(number)))
             };
             let (results, reason_code, reason) = each(&call.ids, decide);
             outgoing.push(Outgoing::Reviewed(id, msg::ReviewStripsResponse { results, reason_code, reason }));
@@ -112,10 +110,13 @@ impl Desk {
             outgoing.push(Outgoing::History(id, call));
         }
         while let Some((id, call)) = next(&self.list)? {
-            self.list.respond(id, list(logic, base, &call))?;
+            self.list.respond(id, list(book.logic(), base, &call))?;
         }
         while let Some((id, call)) = next(&self.preview)? {
-            self.preview.respond(id, preview(logic, base, &call))?;
+            self.preview.respond(id, preview(book.logic(), base, &call))?;
+        }
+        while let Some((id, call)) = next(&self.ways)? {
+            self.ways.respond(id, ways::list(book, &base.stamper, &call))?;
         }
         while let Some((id, _)) = next(&self.limits)? {
             self.limits.respond(id, messages::limits(&base.mission.cutting()))?;
@@ -124,17 +125,17 @@ impl Desk {
     }
 
     /// Takes up to `slice` requests of the submissions that have come.
-    pub(super) fn work(&mut self, logic: &mut RequestLogic, slice: usize, outgoing: &mut Vec<Outgoing>) {
+    pub(super) fn work(&mut self, book: &mut Book, slice: usize, outgoing: &mut Vec<Outgoing>) {
         let mut left = slice;
         while left > 0
             && let Some(job) = self.jobs.front_mut()
         {
             let taken = job.requests.by_ref().take(left);
-            let (before, now) = (job.results.len(), logic.now());
+            let before = job.results.len();
             job.results.extend(taken.map(|request| {
-                let before = logic.len();
-                let result = logic.submit(order_of(&request), now);
-                messages::submit_result(logic, logic.len() == before, result)
+                let before = book.logic().len();
+                let result = book.submit(order_of(&request));
+                messages::submit_result(book.logic(), book.logic().len() == before, result)
             }));
             left -= job.results.len() - before;
             if job.requests.len() == 0
@@ -165,7 +166,7 @@ impl Desk {
             Outgoing::Reviewed(id, response) => self.review.respond(id, response)?,
             Outgoing::Get(id, call) => self.get.respond(id, get(logic, base, store, &call)?)?,
             Outgoing::History(id, call) => self.history.respond(id, history(base, store, &call)?)?,
-            Outgoing::Offer(_) | Outgoing::Result(_) | Outgoing::News(_) | Outgoing::Summary => {}
+            Outgoing::Offer(_) | Outgoing::Result(_) | Outgoing::Radio(_) | Outgoing::News(_) | Outgoing::Summary => {}
         }
         Ok(())
     }

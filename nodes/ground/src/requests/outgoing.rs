@@ -14,6 +14,8 @@ pub(super) enum Outgoing {
     Offer(Box<msg::UpcomingStrips>),
     /// How a task went, with its reward.
     Result(Box<msg::TaskResult>),
+    /// What leaves by the radio.
+    Radio(Box<msg::RadioSent>),
     /// Changes.
     News(Arc<Vec<Entry>>),
     /// How many requests stand where, when the mission is over.

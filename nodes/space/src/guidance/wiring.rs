@@ -14,6 +14,7 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 use super::logic::{Command, Effect, GuidanceLogic, Lost};
 use super::messages;
+use super::radio::RadioGate;
 use swath_mission::alarms::conditions::{back, of_health};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
@@ -66,7 +67,9 @@ struct GuidanceNode {
     points: Publisher<msg::DecisionPoint>,
     status: Publisher<msg::GuidanceStatus>,
     phases: Publisher<msg::TaskPhase>,
-    aborts: Subscription<msg::TaskAbort>,
+    /// There is none where there is a radio.
+    aborts: Option<Subscription<msg::TaskAbort>>,
+    radio: Option<RadioGate>,
     /// Task and whether it images, as they were told last.
     phase_told: Option<(u64, bool)>,
     status_every: u64,
@@ -126,7 +129,11 @@ impl GuidanceNode {
             points: base.node.publisher(&graph::DECISION_POINT)?,
             status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
             phases: base.node.publisher(&graph::TASK_PHASE)?,
-            aborts: base.node.subscription(&graph::TASK_ABORT)?,
+            aborts: match mission.link {
+                None => Some(base.node.subscription(&graph::TASK_ABORT)?),
+                Some(_) => None,
+            },
+            radio: RadioGate::new(&base, pace)?,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             deadline,
@@ -140,17 +147,37 @@ impl GuidanceNode {
     }
 
     fn turn(&mut self) -> Result<()> {
-        while let Some(message) = self.aborts.take()? {
-            if self.logic.on_abort(message.task) {
-                tracing::info!("task {} is given up: {}", message.task, message.reason);
-            }
+        while let Some(message) = self.aborts.as_ref().map_or(Ok(None), Subscription::take)? {
+            self.give_up(message.task, &message.reason);
         }
+        self.listen()?;
         self.take_states()?;
         while let Some(message) = self.tasks.take()? {
             self.take_task(&message)?;
         }
         let wait = self.mind_question()?;
-        self.base.wait(wait)?;
+        let patience = self.radio.as_ref().and_then(RadioGate::patience);
+        self.base.wait(patience.map_or(wait, |patience| patience.min(wait)))?;
+        Ok(())
+    }
+
+    fn give_up(&mut self, task: u64, reason: &str) {
+        if self.logic.on_abort(task) {
+            tracing::info!("task {task} is given up: {reason}");
+        }
+    }
+
+    /// What was heard over the radio.
+    fn listen(&mut self) -> Result<()> {
+        while let Some(heard) = self.radio.as_mut().map_or(Ok(None), RadioGate::take)? {
+            if heard.abort {
+                self.give_up(heard.abort_task, &heard.reason);
+            }
+            if heard.hold && self.logic.wanted() == Some(heard.hold_task) {
+                let effects = self.logic.on_absence(u32::MAX);
+                self.carry_out(effects)?;
+            }
+        }
         Ok(())
     }
 
@@ -168,6 +195,12 @@ impl GuidanceNode {
             }
         }
         while let Some(mut state) = self.unpaired.0.pop_front() {
+            let flown = self.logic.wanted().is_none().then(|| self.logic.flown());
+            let may_look = self.radio.as_mut().map_or(Ok(true), |it| it.may_look(&self.base, state.tick, flown))?;
+            if !may_look {
+                self.unpaired.0.push_front(state);
+                break;
+            }
             if self.truths.is_some() {
                 state.truth = self.unpaired.1.remove(&state.tick);
                 if state.truth.is_none() {
@@ -277,6 +310,8 @@ impl GuidanceNode {
     fn send(&mut self, command: &Command) -> Result<()> {
         self.base.set_now(command.tick);
         self.torques.publish(&messages::wheel_torque(&self.base.stamper, command))?;
+        let flown = self.logic.flown();
+        self.radio.as_mut().map_or(Ok(()), |it| it.answered(&self.base, command.tick, flown))?;
         let phase = (command.task, command.guidance.imaging);
         if command.has_strip && self.phase_told != Some(phase) {
             self.phase_told = Some(phase);

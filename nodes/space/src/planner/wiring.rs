@@ -62,10 +62,10 @@ struct PlannerNode {
     upcoming: Subscription<msg::UpcomingStrips>,
     tasks: Publisher<msg::ImagingTask>,
     decisions: Publisher<msg::Decision>,
-    status: Publisher<msg::PlannerStatus>,
+    status: Option<Publisher<msg::PlannerStatus>>,
     actions: Publisher<msg::OperatorAction>,
-    set_mode: Server<msg::SetPlannerMode>,
-    review: Server<msg::ReviewProposal>,
+    /// There are none where there is a radio: nobody on the ground reaches the planner, or sees it.
+    services: Option<(Server<msg::SetPlannerMode>, Server<msg::ReviewProposal>)>,
     status_told: Option<msg::PlannerStatus>,
     strips: Vec<msg::Candidate>,
     last: Option<msg::ImagingTask>,
@@ -93,10 +93,15 @@ impl PlannerNode {
         let planner = GatedPlanner { gate, planner };
         Ok(Self {
             logic: PlannerLogic::new((*base.model).clone(), planner),
-            status: base.node.publisher(&graph::PLANNER_STATUS)?,
+            status: match base.mission.link {
+                None => Some(base.node.publisher(&graph::PLANNER_STATUS)?),
+                Some(_) => None,
+            },
             actions: base.node.publisher(&graph::PLANNER_ACTIONS)?,
-            set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
-            review: base.node.server(&graph::REVIEW_PROPOSAL)?,
+            services: match base.mission.link {
+                None => Some((base.node.server(&graph::SET_PLANNER_MODE)?, base.node.server(&graph::REVIEW_PROPOSAL)?)),
+                Some(_) => None,
+            },
             status_told: None,
             points: base.node.subscription(&graph::DECISION_POINT)?,
             upcoming: base.node.subscription(&graph::UPCOMING_STRIPS)?,
@@ -159,12 +164,13 @@ impl PlannerNode {
 
     /// What operators say; it counts from the next decision on.
     fn take_orders(&mut self) -> Result<()> {
+        let Some((set_mode, review)) = &mut self.services else { return Ok(()) };
         let mut taken = Vec::new();
         let (at, initial) = (self.now, self.last.is_none());
         let mut note = |actor: String, act: Act| taken.push(Action { at, initial, actor, reason: String::new(), act });
         let mut set = None;
         let gate = self.logic.gate_mut();
-        self.set_mode.answer_all(|call| match planner_mode(call.mode) {
+        set_mode.answer_all(|call| match planner_mode(call.mode) {
             Ok(mode) => {
                 tracing::info!("{} sets the mode to {mode:?}", call.actor);
                 gate.set_mode(mode);
@@ -174,7 +180,7 @@ impl PlannerNode {
             }
             Err(error) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
         })?;
-        self.review.answer_all(|call| match gate.review(call.proposal, call.approve, &call.actor) {
+        review.answer_all(|call| match gate.review(call.proposal, call.approve, &call.actor) {
             Ok(proposal) => {
                 let verb = if call.approve { "approves" } else { "rejects" };
                 tracing::info!("{} {verb} proposal {proposal}", call.actor);
@@ -194,6 +200,7 @@ impl PlannerNode {
 
     /// Tells the mode and the proposal when they have changed.
     fn tell_status(&mut self) -> Result<()> {
+        let Some(topic) = &self.status else { return Ok(()) };
         let proposed = self.logic.gate().proposal().map(|proposal| proposal.candidate.id.0);
         let known = self.status_told.as_ref().map(|status| &status.strip).filter(|strip| Some(strip.id) == proposed);
         let offered = self.strips.iter().map(|candidate| &candidate.strip);
@@ -203,7 +210,7 @@ impl PlannerNode {
         let same =
             |told: &msg::PlannerStatus| msg::PlannerStatus { header: told.header.clone(), ..status.clone() } == *told;
         if !self.status_told.as_ref().is_some_and(same) {
-            self.status.publish(&status)?;
+            topic.publish(&status)?;
             self.status_told = Some(status);
         }
         Ok(())
