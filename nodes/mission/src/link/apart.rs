@@ -111,10 +111,10 @@ impl Apart {
         }
     }
 
-    /// A tick ends: both send.
+    /// A tick ends: both send, once.
     fn finish(&mut self, tick: Tick) {
-        self.finished = Some(tick);
-        if self.radio().open(tick) {
+        let first = self.finished.replace(tick).is_none_or(|finished| finished < tick);
+        if first && self.radio().open(tick) {
             if !self.ground_is_left(tick) {
                 self.channel.carry(Direction::Up, tick, self.ground.transmit(tick));
             }
