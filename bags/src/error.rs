@@ -157,6 +157,16 @@ impl BagError {
     }
 
     /// Whether an I/O error means that the file can no longer grow.
+    /// Whether there is no room left on the disk.
+    #[must_use]
+    pub fn is_no_room(&self) -> bool {
+        match self {
+            Self::DiskFull { .. } => true,
+            Self::Io { source, .. } => Self::is_disk_full(source),
+            _ => false,
+        }
+    }
+
     pub(crate) fn is_disk_full(error: &io::Error) -> bool {
         matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge)
     }

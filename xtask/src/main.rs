@@ -35,14 +35,16 @@ usage: cargo xtask COMMAND
                    that all of them are used; builds the tools that are missing
   bench            run every crate's measurements and print one JSON object
   wheel            build the Python package into target/wheels
-  chaos [--first SEED] --seeds N
-                   fly N missions whose faults are drawn from their seeds, check what
-                   must hold whatever fails, and print what repeats a failure
+  chaos [--first SEED] --seeds N [--over-dds]
+                   fly N missions whose faults are drawn from their seeds, in one process
+                   or over DDS, check what must hold whatever fails, print one JSON object
+                   and, of a failure, the command that repeats it
   soak [NAME [SEEDS]]
                    run a long figure to its end and print it as JSON; one that was
                    stopped goes on; without a name, list them
-  web              test and build the console's page with npm, from its sources into
-                   the files that the program holds
+  web [--picture]  test and build the console's page with npm, from its sources into
+                   the files that the program holds; with --picture, take the
+                   README's picture of it instead: a test flies the mission
   ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
                    in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
   soak python      run the Python package's long examples; they fetch gigabytes
@@ -161,19 +163,29 @@ fn lint(root: &Path, args: &[OsString]) -> Result<()> {
     lint::run(root)
 }
 
-/// Missions in one process need neither torch nor Python: nothing is set up.
+/// Missions in one process need neither torch nor Python: for those nothing is set up.
 fn chaos(root: &Path, args: &[OsString]) -> Result<()> {
-    let words: Option<Vec<&str>> = args.iter().map(|word| word.to_str()).collect();
+    let (over_dds, words): (Vec<_>, Vec<_>) =
+        args.iter().map(|word| word.to_str()).partition(|it| *it == Some("--over-dds"));
+    let words: Option<Vec<&str>> = words.into_iter().collect();
     let (first, count) = match words.as_deref() {
         Some(["--seeds", count]) => ("0", *count),
         Some(["--first", first, "--seeds", count] | ["--seeds", count, "--first", first]) => (*first, *count),
-        _ => bail!("chaos takes --seeds N, and --first SEED\n\n{USAGE}"),
+        _ => bail!("chaos takes --seeds N, and --first SEED and --over-dds\n\n{USAGE}"),
     };
     for (name, text) in [("--first", first), ("--seeds", count)] {
         text.parse::<u64>().with_context(|| format!("{name} {text} is no whole number"))?;
     }
+    let (package, example) = match over_dds.is_empty() {
+        true => ("swath-mission", "chaos"),
+        false => {
+            setup(root, false)?;
+            process::run(process::cargo(root, "build").args(["--quiet", "--release", "--workspace", "--bins"]))?;
+            ("swath-nodes", "chaos_over_dds")
+        }
+    };
     let mut cargo = process::cargo(root, "run");
-    cargo.args(["--quiet", "--release", "--package", "swath-mission", "--example", "chaos", "--", first, count]);
+    cargo.args(["--quiet", "--release", "--package", package, "--example", example, "--", first, count]);
     Err(process::become_command(&mut cargo))
 }
 
@@ -187,10 +199,14 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
 }
 
 fn web(root: &Path, args: &[OsString]) -> Result<()> {
-    if !args.is_empty() {
-        bail!("web takes no arguments\n\n{USAGE}");
+    match args {
+        [] => web::build(root),
+        [flag] if flag == "--picture" => {
+            setup(root, true)?;
+            web::picture(root, &venv::python(root))
+        }
+        _ => bail!("web takes nothing but --picture\n\n{USAGE}"),
     }
-    web::build(root)
 }
 
 fn ament(root: &Path, args: &[OsString]) -> Result<()> {

@@ -24,7 +24,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("swath-node", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission"]),
     ("swath-space", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-node"]),
     ("swath-ground", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
-    ("swath-bridge", &["swath-msgs", "swath-ros", "swath-bags", "swath-mission"]),
+    ("swath-bridge", &["swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
     ("swath-console", &["swath-sim", "swath-msgs", "swath-ros", "swath-bags", "swath-mission", "swath-node"]),
     (
         "swath-nodes",

@@ -12,7 +12,7 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::Subcommand;
-pub use record::{MANIFEST, MANIFEST_TEXT};
+pub use record::{MANIFEST, MANIFEST_TEXT, NO_ROOM};
 use swath_ros::RosArgs;
 
 use crate::error::{BagError, Result};

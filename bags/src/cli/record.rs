@@ -28,14 +28,17 @@ pub const MANIFEST: &str = "swath_manifest";
 /// Its entry that holds the manifest as it was given.
 pub const MANIFEST_TEXT: &str = "manifest";
 
+/// Exit code of a recorder that has no room left.
+pub const NO_ROOM: u8 = 4;
+
 /// Arguments of `record`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   swath-bag record -o out/bag --exclude '/rosout|/parameter_events' --max-bag-duration 5400
 
 Prints {\"event\":\"ready\",…} when every subscription exists, and {\"event\":\"closed\",…} at the end.
-Ctrl-C or SIGTERM closes the bag, which another signal does not disturb. Exits with 3 when messages were lost, with 1
-when they could not be stored.
+Ctrl-C or SIGTERM closes the bag, which another signal does not disturb. Exits with 3 when messages were lost, with 4
+when there is no room left: the bag is whole up to there, and --resume goes on with it.
 Services: ~/pause, ~/resume, ~/toggle_paused, ~/is_paused, ~/split_bagfile, ~/snapshot, ~/stop.
 Words after --ros-args are those of every ROS 2 program.")]
 pub struct RecordArgs {
@@ -90,6 +93,9 @@ pub struct RecordArgs {
     /// Go on with the bag, if it is there, in a new file; files that were not closed are saved when this one is
     #[arg(long)]
     resume: bool,
+    /// Store nothing of these log times [ns], as if the disk were full; may be repeated
+    #[arg(long, value_name = "FROM..UNTIL", value_parser = span)]
+    full_disk: Vec<(u64, u64)>,
     /// Kind of files: mcap is the only one that is written
     #[arg(short, long, default_value = "mcap", value_parser = ["mcap"])]
     storage: String,
@@ -126,14 +132,27 @@ pub struct RecordArgs {
 
 impl RecordArgs {
     pub(super) fn run(self, ros: &RosArgs) -> Result<ExitCode> {
-        let recorder = Recorder::start(self.options()?, ros)?;
+        let recorder = match Recorder::start(self.options()?, ros) {
+            Err(error) if error.is_no_room() => {
+                say(&format!("error: {}", crate::error::chain(&error)));
+                return Ok(ExitCode::from(NO_ROOM));
+            }
+            recorder => recorder?,
+        };
         let shutdown = shutdown_on_signals(recorder.signal())?;
         let summary = recorder.run(&shutdown, |topics| {
             // The launcher waits for this line; without it, it gives up by itself.
             if let Err(error) = print_json(&json!({ "event": "ready", "topics": topics })) {
                 tracing::warn!("{}", crate::error::chain(&error));
             }
-        })?;
+        });
+        let summary = match summary {
+            Err(error) if error.is_no_room() => {
+                say(&format!("error: {}", crate::error::chain(&error)));
+                return Ok(ExitCode::from(NO_ROOM));
+            }
+            summary => summary?,
+        };
         print_json(&json!({
             "event": "closed", "messages": summary.messages, "lost": summary.lost,
             "bytes": summary.bytes, "files": summary.files,
@@ -162,6 +181,7 @@ impl RecordArgs {
                 snapshot_bytes: self.snapshot_mode.then_some(self.max_cache_size as usize),
                 custom_data: self.custom_data.into_iter().collect(),
                 resume: self.resume,
+                full: self.full_disk,
                 ..shape
             },
             selection,
@@ -230,6 +250,15 @@ fn format(text: &str) -> Result<Compression, String> {
     }
 }
 
+/// Times from the first one up to the second.
+fn span(text: &str) -> Result<(u64, u64), String> {
+    let refused = || format!("{text:?} is not FROM..UNTIL in nanoseconds");
+    let (from, until) = text.split_once("..").ok_or_else(refused)?;
+    let time = |text: &str| text.parse::<u64>().map_err(|_| refused());
+    let (from, until) = (time(from)?, time(until)?);
+    if from < until { Ok((from, until)) } else { Err(format!("{text:?} ends before it begins")) }
+}
+
 fn pair(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or_else(|| format!("{text:?} is not KEY=VALUE"))?;
     Ok((key.to_owned(), value.to_owned()))
@@ -258,6 +287,14 @@ fn manifest(path: &Path) -> Result<BTreeMap<String, String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn spans_are_read_or_refused() {
+        assert_eq!(span("5..18446744073709551615"), Ok((5, u64::MAX)));
+        for wrong in ["5", "5..", "-1..5", "a..b", "5..5", "9..5"] {
+            assert!(span(wrong).unwrap_err().contains(wrong), "{wrong}");
+        }
+    }
 
     #[test]
     fn manifests_are_toml_or_json() {

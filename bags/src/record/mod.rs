@@ -153,7 +153,15 @@ impl Recorder {
         let stamp = tap.node().clock().stamp();
         let dir = sink.writer().dir().to_owned();
         let summary = sink.close();
-        let summary = if resumed { summary.and_then(|summary| whole(&dir, summary)) } else { summary };
+        let summary = match (resumed, summary) {
+            (true, Ok(summary)) => whole(&dir, summary),
+            (true, Err(error)) => {
+                // What went before is not lost with this file.
+                whole(&dir, BagSummary::default()).map_or_else(|error| tracing::warn!("{error}"), drop);
+                Err(error)
+            }
+            (false, summary) => summary,
+        };
         control.report_end(&summary, stamp);
         drop(control);
         drop(tap);

@@ -125,6 +125,9 @@ impl Storage {
     }
 
     fn store_chunk(&mut self, chunk: &Chunk) -> io::Result<()> {
+        if self.options.full.iter().any(|&(from, until)| chunk.start < until && from <= chunk.end) {
+            return Err(io::ErrorKind::StorageFull.into());
+        }
         if std::mem::take(&mut self.split) {
             self.next_file()?;
         }
@@ -411,6 +414,33 @@ mod tests {
                 Err(error) => panic!("room for {room} bytes: {error}"),
             }
         }
+    }
+
+    #[test]
+    fn a_disk_that_is_full_by_order_is_as_any_other_and_the_bag_goes_on_after_it() {
+        let temp = tempfile::tempdir().unwrap();
+        let dir = temp.path().join("ordered");
+        let options = BagOptions {
+            chunk_bytes: 1000,
+            resume: true,
+            full: vec![(200, 300)],
+            compression: Compression::None,
+            ..BagOptions::default()
+        };
+        let topic = Topic::new("/x", "a/msg/B", "uint64 x\n", "", vec![QosProfile::reliable(1)]).unwrap();
+        let write = |times: std::ops::Range<u64>| {
+            let bag = BagWriter::create(&dir, options.clone()).unwrap();
+            let id = bag.add_topic(&topic).unwrap();
+            let payload = [0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8];
+            let accepted = times.take_while(|&n| bag.write(id, n, n, &payload).is_ok()).count();
+            (accepted as u64, bag.close())
+        };
+        let (accepted, Err(BagError::DiskFull { kept, lost, .. })) = write(0..400) else { panic!("no room for 200") };
+        assert!(kept < 200 && kept + lost == accepted, "{kept} of {accepted} are kept");
+        assert!(matches!(write(250..400).1, Err(BagError::DiskFull { kept: 0, .. })));
+        assert_eq!(write(300..400).1.unwrap().messages, 100);
+        crate::ops::mend::mend(&dir, crate::file::source::ReadOptions::default()).unwrap();
+        assert_eq!(Bag::open(&dir).unwrap().information().unwrap().message_count, kept + 100);
     }
 
     #[test]

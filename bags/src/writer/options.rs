@@ -30,6 +30,8 @@ pub struct BagOptions {
     pub ros_distro: String,
     /// Go on with a bag that is there, in a new file.
     pub resume: bool,
+    /// Log times of which nothing can be stored, as if the disk were full: from the first one up to the second [ns].
+    pub full: Vec<(u64, u64)>,
 }
 
 impl Default for BagOptions {
@@ -46,6 +48,7 @@ impl Default for BagOptions {
             custom_data: BTreeMap::new(),
             ros_distro: "jazzy".to_owned(),
             resume: false,
+            full: Vec::new(),
         }
     }
 }

@@ -1,13 +1,14 @@
 //! Flies missions whose faults are drawn from seeds, in this process, and checks from the outside what must hold
 //! whatever fails: `chaos FIRST_SEED COUNT`.
 //!
-//! Exit code 1 when something did not hold; each failure prints one command that repeats it.
+//! Prints one JSON object. Exit code 1 when something did not hold; each failure tells one command that repeats it.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program for people")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
+use serde_json::json;
 use swath_mission::alarms::Entry;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::fallback::GuardedPlanner;
@@ -31,21 +32,26 @@ fn main() -> ExitCode {
         eprintln!("usage: chaos FIRST_SEED COUNT");
         return ExitCode::FAILURE;
     };
-    let (mut failed, mut alarms, mut reward) = (0, 0, 0.0);
+    let (mut failed, mut faults, mut alarms, mut reward) = (Vec::new(), 0, 0, 0.0);
     for seed in first..first.saturating_add(count) {
         match fly_and_check(seed) {
-            Ok(flown) => {
+            Ok((planned, flown)) => {
+                faults += planned;
                 alarms += flown.journal.len();
                 reward += flown.lines.iter().map(|line| line.reward).sum::<f64>();
             }
             Err(error) => {
-                failed += 1;
-                println!("seed {seed}: {error:#}\n  repeat with: cargo xtask chaos --first {seed} --seeds 1");
+                failed.push(seed);
+                eprintln!("seed {seed}: {error:#}\n  repeat with: cargo xtask chaos --first {seed} --seeds 1");
             }
         }
     }
-    println!("{count} missions, {failed} failed, {alarms} lines of alarms, reward {reward:.1}");
-    if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    let ok = failed.is_empty();
+    let figures = json!({
+        "missions": count, "failed": failed, "faults": faults, "alarm_lines": alarms, "reward": reward,
+    });
+    println!("{figures}");
+    if ok { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// What a mission left behind.
@@ -96,12 +102,13 @@ fn fly(seed: u64) -> Result<(Mission, Flown)> {
     Ok((mission, Flown { lines, journal, requests }))
 }
 
-fn fly_and_check(seed: u64) -> Result<Flown> {
+/// Number of its faults, and what it left.
+fn fly_and_check(seed: u64) -> Result<(usize, Flown)> {
     let (mission, flown) = fly(seed)?;
     let plan = mission.faults.plan.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     check(&mission, &flown).with_context(|| format!("faults {plan}"))?;
     ensure!(fly(seed)?.1 == flown, "the same seed twice gives two missions; faults {plan}");
-    Ok(flown)
+    Ok((mission.faults.plan.len(), flown))
 }
 
 fn check(mission: &Mission, flown: &Flown) -> Result<()> {
@@ -167,8 +174,11 @@ fn check_journal(flown: &Flown, horizon: Tick) -> Result<()> {
 fn check_alarm(scheduled: &Scheduled, flown: &Flown, horizon: Tick) -> Result<()> {
     let name = match scheduled.what {
         What::Process(process, _) => format!("{} lost", process.name()),
+        What::Drop(_) => "messages dropped".to_owned(),
+        What::StoreFull => "store full".to_owned(),
+        What::BagFull => "bag full".to_owned(),
         // A wheel shows when it is asked for torque, a bias when it stands out of the noise.
-        _ => return Ok(()),
+        What::Vehicle(_) => return Ok(()),
     };
     let from = scheduled.from;
     let of = |entry: &&Entry| entry.key.name == name && entry.tick >= from;

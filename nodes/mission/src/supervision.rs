@@ -59,6 +59,17 @@ pub enum Step {
     GiveUp,
 }
 
+/// What a sign of life of a process means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// It goes on as before, or counts no more.
+    AsBefore,
+    /// It is the first one since its start.
+    First,
+    /// It was warned of.
+    AfterWarning,
+}
+
 /// Where a process stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -94,27 +105,38 @@ impl Watch {
         self.stage = Stage::Runs { sign: now, fresh: true, warned: false };
     }
 
-    /// It gives a sign of life. Returns whether it is the first since its start.
-    pub fn sign(&mut self, now: Duration) -> bool {
-        let Stage::Runs { fresh, .. } = self.stage else { return false };
+    /// It gives a sign of life.
+    pub fn sign(&mut self, now: Duration) -> Heard {
+        let Stage::Runs { fresh, warned, .. } = self.stage else { return Heard::AsBefore };
         self.stage = Stage::Runs { sign: now, fresh: false, warned: false };
-        fresh
+        match (fresh, warned) {
+            (true, _) => Heard::First,
+            (_, true) => Heard::AfterWarning,
+            _ => Heard::AsBefore,
+        }
     }
 
     /// It has ended.
     pub fn lost(&mut self, now: Duration) -> Step {
+        self.wait_after_loss(now);
+        if self.losses() > self.config.starts {
+            return self.give_up();
+        }
+        Step::Nothing
+    }
+
+    /// It has ended for want of something that may be there again at any time: it is started again however often.
+    pub fn wants(&mut self, now: Duration) {
+        self.wait_after_loss(now);
+    }
+
+    fn wait_after_loss(&mut self, now: Duration) {
         let seconds = Duration::from_secs_f64;
         let since = now.saturating_sub(seconds(self.config.within_s));
         self.losses.retain(|&loss| loss >= since);
         self.losses.push_back(now);
-        let count = self.losses.len() as u32;
-        if count > self.config.starts {
-            self.stage = Stage::GivenUp;
-            return Step::GiveUp;
-        }
-        let pause = (self.config.backoff_s * 2_f64.powi(count as i32 - 1)).min(self.config.backoff_max_s);
-        self.stage = Stage::Waits { until: now + seconds(pause) };
-        Step::Nothing
+        let doubled = self.config.backoff_s * 2_f64.powi(self.losses() as i32 - 1);
+        self.stage = Stage::Waits { until: now + seconds(doubled.min(self.config.backoff_max_s)) };
     }
 
     /// It is not started again.
@@ -172,8 +194,8 @@ mod tests {
 
     fn watch() -> Watch {
         let mut watch = Watch::new(SupervisionConfig::default(), ms(0));
-        assert!(watch.sign(ms(1000)));
-        assert!(!watch.sign(ms(1500)));
+        assert_eq!(watch.sign(ms(1000)), Heard::First);
+        assert_eq!(watch.sign(ms(1500)), Heard::AsBefore);
         watch
     }
 
@@ -183,12 +205,12 @@ mod tests {
         assert_eq!(watch.step(ms(3499)), Step::Nothing);
         assert_eq!(watch.step(ms(3500)), Step::Warn);
         assert_eq!(watch.step(ms(4000)), Step::Nothing);
-        watch.sign(ms(4100));
+        assert_eq!(watch.sign(ms(4100)), Heard::AfterWarning);
         assert_eq!(watch.step(ms(6100)), Step::Warn);
         assert_eq!(watch.step(ms(9099)), Step::Nothing);
         assert_eq!(watch.step(ms(9100)), Step::Kill);
         assert_eq!(watch.step(ms(20_000)), Step::Nothing, "it is killed once");
-        assert!(!watch.sign(ms(20_001)), "what it has said before counts no more");
+        assert_eq!(watch.sign(ms(20_001)), Heard::AsBefore, "what it has said before counts no more");
         assert_eq!(watch.lost(ms(20_002)), Step::Nothing);
         assert_eq!(watch.step(ms(20_202)), Step::Start);
     }
@@ -218,6 +240,18 @@ mod tests {
         assert_eq!(watch.step(now + ms(100_000)), Step::Nothing);
         watch.pardon(now);
         assert_eq!(watch.step(now), Step::Start);
+    }
+
+    #[test]
+    fn one_that_wants_something_is_started_however_often() {
+        let mut watch = watch();
+        for loss in 0..100 {
+            let now = ms(2000 + loss * 1000);
+            watch.wants(now);
+            assert!(!watch.given_up());
+            assert_eq!(watch.step(now + ms(5000)), Step::Start, "loss {loss}");
+            watch.started(now);
+        }
     }
 
     #[test]

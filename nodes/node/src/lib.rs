@@ -1,6 +1,7 @@
 //! What the nodes of a mission share: how one starts, its stamps, and the messages that several of them read or write.
 
 pub mod error;
+pub mod fault_orders;
 pub mod messages;
 pub mod node;
 pub mod orders;

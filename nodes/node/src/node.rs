@@ -9,11 +9,13 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use swath_ros::{Node, Publisher, RosArgs, Shutdown, Spec, graph};
+use swath_ros::{Dropping, Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
+use crate::fault_orders::FaultOrders;
 use crate::out;
 use crate::program::{MISSION, Program};
 use crate::stamp::Stamper;
@@ -43,6 +45,9 @@ pub struct MissionNode {
     /// What is ordered to befall this node, the next first, and how often something has already.
     ordered: VecDeque<(Scheduled, Failure)>,
     struck: u64,
+    /// As which it can be made to fail.
+    process: Option<Process>,
+    pub(crate) fault_orders: FaultOrders,
 }
 
 /// How grave an alarm is.
@@ -80,10 +85,9 @@ impl MissionNode {
         let keep = PathBuf::from(node.parameters().declare(keep.read_only())?);
         let struck = Spec::new("struck", 0_i64, "Faults ordered for this node that have befallen it already.");
         let struck = node.parameters().declare(struck.in_range(0.0..=1e6).read_only())?.unsigned_abs();
-        let process = Process::ALL.into_iter().find(|process| process.name() == name);
-        let ordered = process.map(|process| mission.faults.of(process, model.period)).unwrap_or_default();
         let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
-        Ok(Self {
+        let fault_orders = FaultOrders::new(&node, name, mission.tells_truth_apart(model.period))?;
+        let mut base = Self {
             shutdown,
             horizon: mission.horizon(&model),
             stamper: Stamper::new(mission.epoch_unix_s, model.period).in_namespace(node.names().namespace()),
@@ -91,10 +95,29 @@ impl MissionNode {
             mission,
             diagnostics,
             keep: (!keep.as_os_str().is_empty()).then_some(keep),
-            ordered: ordered.into_iter().skip(struck as usize).collect(),
+            ordered: VecDeque::new(),
             struck,
+            process: Process::ALL.into_iter().find(|process| process.name() == name),
+            fault_orders,
             node,
-        })
+        };
+        base.mind_own_faults();
+        base.take_up_fault_orders()?;
+        Ok(base)
+    }
+
+    /// What is ordered to befall this node follows from the mission anew.
+    pub(crate) fn mind_own_faults(&mut self) {
+        let ordered = self.process.map(|process| self.mission.faults.of(process, self.model.period));
+        self.ordered = ordered.unwrap_or_default().into_iter().skip(self.struck as usize).collect();
+        let end_ns = |tick: Tick| if tick == FOR_GOOD { u64::MAX } else { self.stamper.nanoseconds(tick) };
+        let dropping = |(it, share): (Scheduled, f64)| Dropping {
+            from_ns: self.stamper.nanoseconds(it.from),
+            until_ns: end_ns(it.until),
+            share,
+        };
+        let drops = self.mission.faults.drops(self.model.period);
+        self.node.set_drops(self.mission.seed, drops.into_iter().map(dropping).collect());
     }
 
     /// A file in which this node keeps what it needs to go on when it is started again; nothing where nobody would.
@@ -134,9 +157,8 @@ impl MissionNode {
     /// The fault that befell this node last, if it was started again because of one.
     #[must_use]
     pub fn struck(&self) -> Option<Scheduled> {
-        let process = Process::ALL.into_iter().find(|process| self.node.names().name() == process.name())?;
         let last = usize::try_from(self.struck.checked_sub(1)?).ok()?;
-        self.mission.faults.of(process, self.model.period).get(last).map(|(it, _)| *it)
+        self.mission.faults.of(self.process?, self.model.period).get(last).map(|(it, _)| *it)
     }
 
     /// Waits for news, and tells whether there are any; what went wrong with the messages of others is an alarm.
@@ -189,7 +211,7 @@ impl MissionNode {
     /// # Errors
     /// When it cannot be sent.
     pub fn condition(&self, report: &Report) -> Result<()> {
-        let Report { tick, key, wrong, text } = report;
+        let Report { tick, key, wrong, text, .. } = report;
         let level = match (wrong, definition(&key.name).map(|it| it.severity)) {
             (false, _) => DiagnosticStatus::OK,
             (true, Some(alarms::Severity::Warn)) => DiagnosticStatus::WARN,

@@ -26,6 +26,19 @@ pub const ORBIT_FRAME: &str = "orbit";
 /// Name of the body frame B in headers.
 pub const BODY_FRAME: &str = "body";
 
+/// What frames of nodes in a namespace begin with.
+fn prefix(namespace: &str) -> String {
+    let own = namespace.trim_matches('/');
+    let shared = namespace == graph::NAMESPACE || own.is_empty();
+    if shared { String::new() } else { format!("{own}/") }
+}
+
+/// Full name of a frame of nodes in a namespace.
+#[must_use]
+pub fn frame_in(namespace: &str, name: &str) -> String {
+    format!("{}{name}", prefix(namespace))
+}
+
 impl Stamper {
     /// A stamper for a mission's epoch.
     #[must_use]
@@ -37,9 +50,7 @@ impl Stamper {
     /// two satellites do not share one.
     #[must_use]
     pub fn in_namespace(self, namespace: &str) -> Self {
-        let own = namespace.trim_matches('/');
-        let shared = namespace == graph::NAMESPACE || own.is_empty();
-        Self { prefix: if shared { String::new() } else { format!("{own}/") }, ..self }
+        Self { prefix: prefix(namespace), ..self }
     }
 
     /// Full name of a frame.

@@ -11,44 +11,25 @@ use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
-    AcknowledgeAlarm, AlarmEvent, CancelStrips, CatalogueHeard, Decision, DecisionPoint, GetLimits, GetStrip,
-    GuidanceReached, GuidanceStatus, ImagingTask, LinkStatus, ListAlarms, ListHistory, ListStrips, ListWays,
-    OperatorAction, PlannerStatus, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip, RequestSummary, ReviewProposal,
-    ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms, StripRequest, StripStatus,
-    SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips, WheelTorque,
+    AcknowledgeAlarm, AlarmEvent, CancelStrips, CatalogueHeard, Decision, DecisionPoint, FaultOrders, GetLimits,
+    GetStrip, GuidanceReached, GuidanceStatus, ImagingTask, LinkStatus, ListAlarms, ListHistory, ListStrips, ListWays,
+    OperatorAction, OrderFault, PlannerStatus, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip, RequestSummary,
+    ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms, StripRequest,
+    StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
 
 use crate::qos::Profile;
+use crate::segment::{Segment, segment};
+
+pub use crate::segment::{
+    BRIDGE, CATALOGUE, CONSOLE, GUIDANCE, LAUNCHER, LINK, OPERATOR, PLANNER, PLAYER, RECORDER, REQUEST_MANAGER,
+    SPACECRAFT,
+};
 
 /// The namespace that nodes are in when nobody says otherwise.
 pub const NAMESPACE: &str = "/swath";
-
-/// Integrates the dynamics and owns the clock.
-pub const SPACECRAFT: &str = "spacecraft";
-/// Flies the task in hand.
-pub const GUIDANCE: &str = "guidance";
-/// Keeps every strip that was ever requested.
-pub const REQUEST_MANAGER: &str = "request_manager";
-/// Chooses the next task.
-pub const PLANNER: &str = "planner";
-/// On board, in missions with a radio: keeps the strips that were uplinked, and what became of them.
-pub const CATALOGUE: &str = "catalogue";
-/// The radio between ground and satellite, in missions that have one.
-pub const LINK: &str = "link";
-/// Starts and watches the others.
-pub const LAUNCHER: &str = "launcher";
-/// Writes every topic to a bag.
-pub const RECORDER: &str = "recorder";
-/// Publishes the topics of a bag.
-pub const PLAYER: &str = "player";
-/// The page in a browser and the HTTP API, an operator like others.
-pub const CONSOLE: &str = "console";
-/// Shows topics to Foxglove.
-pub const BRIDGE: &str = "bridge";
-/// A person's command line or another program.
-pub const OPERATOR: &str = "operator";
 
 /// The nodes that fly a mission.
 pub const FLIGHT_NODES: [&str; 4] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER];
@@ -59,41 +40,18 @@ pub const RADIO_NODES: [&str; 2] = [CATALOGUE, LINK];
 /// All nodes that may fly a mission.
 pub const ALL_FLIGHT_NODES: [&str; 6] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER, CATALOGUE, LINK];
 
+/// Topics whose messages come again as long as they are not answered: of these some may be dropped by order.
+pub const COME_AGAIN: [Entry; 6] = [
+    SPACECRAFT_STATE.entry,
+    SPACECRAFT_TRUTH.entry,
+    WHEEL_TORQUE.entry,
+    DECISION_POINT.entry,
+    UPCOMING_STRIPS.entry,
+    PLANNER_TASK.entry,
+];
+
 /// The nodes that count only what other nodes of their mission say, and wait for nobody else.
 pub const MEMBERS: [&str; 7] = [SPACECRAFT, GUIDANCE, REQUEST_MANAGER, PLANNER, CATALOGUE, LINK, LAUNCHER];
-
-/// Where a node of a mission is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Segment {
-    /// On board.
-    Space,
-    /// On the ground.
-    Ground,
-    /// Neither: it makes, watches or records the others, or is the radio between them.
-    Simulator,
-}
-
-/// Where a node of the table is.
-#[must_use]
-pub fn segment(node: &str) -> Segment {
-    match node {
-        SPACECRAFT | GUIDANCE | PLANNER | CATALOGUE => Segment::Space,
-        REQUEST_MANAGER | OPERATOR | CONSOLE | BRIDGE => Segment::Ground,
-        _ => Segment::Simulator,
-    }
-}
-
-impl Segment {
-    /// Its name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Space => "space",
-            Self::Ground => "ground",
-            Self::Simulator => "simulator",
-        }
-    }
-}
 
 /// What the table says of a topic or service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,8 +72,9 @@ pub struct Entry {
 
 impl Entry {
     /// In missions with a radio, each pair of a writer and a reader of which one is on board and the other on the ground.
+    /// Faults are ordered of the simulator, in whichever node it has its place.
     pub fn past_the_radio(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        let ends = |node: &&str| !self.not_by_radio.contains(node);
+        let ends = |node: &&str| !self.not_by_radio.contains(node) && !self.name.starts_with("faults/");
         let across = |(writer, reader): &(&str, &str)| {
             let ends = [segment(writer), segment(reader)];
             ends.contains(&Segment::Space) && ends.contains(&Segment::Ground)
@@ -219,7 +178,7 @@ pub const TASK_ABORT: Topic<TaskAbort> =
         .but_by_radio(&[REQUEST_MANAGER, GUIDANCE]);
 /// What the planner may do by itself, and what it proposes.
 pub const PLANNER_STATUS: Topic<PlannerStatus> =
-    Topic::new("planner/status", Profile::Latched, &[PLANNER], &[OPERATOR]).but_by_radio(&[PLANNER, OPERATOR]);
+    Topic::new("planner/status", Profile::Latched, &[PLANNER], &[LAUNCHER, OPERATOR]).but_by_radio(&[OPERATOR]);
 /// The next task.
 pub const PLANNER_TASK: Topic<ImagingTask> =
     Topic::new("planner/task", Profile::Command, &[PLANNER], &[GUIDANCE, REQUEST_MANAGER])
@@ -253,6 +212,13 @@ pub const STANDING_ALARMS: Topic<StandingAlarms> =
     Topic::new("alarms/standing", Profile::Latched, &[LAUNCHER], &[OPERATOR]);
 /// What happens to alarms.
 pub const ALARM_EVENTS: Topic<AlarmEvent> = Topic::new("alarms/events", Profile::Event, &[LAUNCHER], &[OPERATOR]);
+/// Faults that were ordered while the mission flies.
+pub const FAULT_ORDERS: Topic<FaultOrders> = Topic::new(
+    "faults/orders",
+    Profile::Latched,
+    &[SPACECRAFT],
+    &[GUIDANCE, REQUEST_MANAGER, PLANNER, CATALOGUE, LINK, LAUNCHER],
+);
 /// How many strip requests are in which state.
 pub const REQUEST_SUMMARY: Topic<RequestSummary> =
     Topic::new("requests/summary", Profile::Latched, &[REQUEST_MANAGER], &[LAUNCHER, OPERATOR]);
@@ -305,6 +271,8 @@ pub const ACKNOWLEDGE_ALARM: Service<AcknowledgeAlarm> = Service::new("alarms/ac
 pub const SHELVE_ALARM: Service<ShelveAlarm> = Service::new("alarms/shelve", &[LAUNCHER], &[OPERATOR]);
 /// An operator wants to be told of an alarm again.
 pub const UNSHELVE_ALARM: Service<UnshelveAlarm> = Service::new("alarms/unshelve", &[LAUNCHER], &[OPERATOR]);
+/// Something is to fail.
+pub const ORDER_FAULT: Service<OrderFault> = Service::new("faults/order", &[SPACECRAFT], &[OPERATOR]);
 /// All alarms that are not normal.
 pub const LIST_ALARMS: Service<ListAlarms> = Service::new("alarms/list", &[LAUNCHER], &[OPERATOR]);
 
@@ -340,6 +308,7 @@ pub const TOPICS: &[Entry] = &[
     PLANNER_ACTIONS.entry,
     STANDING_ALARMS.entry,
     ALARM_EVENTS.entry,
+    FAULT_ORDERS.entry,
     DIAGNOSTICS.entry,
     ROSOUT.entry,
     PARAMETER_EVENTS.entry,
@@ -363,6 +332,7 @@ pub const SERVICES: &[Entry] = &[
     SHELVE_ALARM.entry,
     UNSHELVE_ALARM.entry,
     LIST_ALARMS.entry,
+    ORDER_FAULT.entry,
 ];
 
 /// The table as a Mermaid flow chart: nodes are boxes, topics are arrows between them.
@@ -503,9 +473,16 @@ mod tests {
     planner -->|planner/task| guidance
     planner -->|planner/task| request_manager
     planner -->|planner/decision| launcher
+    planner -->|planner/status| launcher
     planner -->|planner/status| operator
     launcher -->|alarms/standing| operator
     launcher -->|alarms/events| operator
+    spacecraft -->|faults/orders| guidance
+    spacecraft -->|faults/orders| request_manager
+    spacecraft -->|faults/orders| planner
+    spacecraft -->|faults/orders| catalogue
+    spacecraft -->|faults/orders| link
+    spacecraft -->|faults/orders| launcher
     operator <-.->|requests/submit| request_manager
     operator <-.->|requests/cancel| request_manager
     operator <-.->|requests/replace| request_manager
@@ -522,6 +499,7 @@ mod tests {
     operator <-.->|alarms/shelve| launcher
     operator <-.->|alarms/unshelve| launcher
     operator <-.->|alarms/list| launcher
+    operator <-.->|faults/order| spacecraft
     FLIGHT([every topic]) --> recorder
 ";
         assert_eq!(mermaid(), expected);

@@ -15,6 +15,7 @@ use crate::cli::RosArgs;
 use crate::clock::SimClock;
 use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
+use crate::drops::{Dropping, Drops};
 use crate::endpoint::{RawPublisher, RawSubscription};
 use crate::entities::Plan;
 use crate::environment::Environment;
@@ -66,6 +67,7 @@ pub struct Node {
     pulse: Pulse,
     epoch: u64,
     replies: AllReplies,
+    drops: Arc<Drops>,
     names: Names,
     environment: Environment,
     dds: Arc<Dds>,
@@ -129,6 +131,7 @@ impl Node {
             pulse,
             epoch,
             replies,
+            drops: Arc::default(),
             names,
             environment,
             dds,
@@ -216,7 +219,13 @@ impl Node {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
         self.roster.remember(Direction::Read, raw.gid(), topic.entry);
-        Ok(Subscription::new(raw, topic.entry.writers))
+        let drops = graph::COME_AGAIN.contains(&topic.entry).then(|| Arc::clone(&self.drops));
+        Ok(Subscription::new(raw, topic.entry.writers, drops))
+    }
+
+    /// Drops a share of the messages that come again when they are not answered, drawn from a seed: a fault by order.
+    pub fn set_drops(&self, seed: u64, drops: Vec<Dropping>) {
+        self.drops.set(seed, drops);
     }
 
     /// A writer of CDR bytes to the topic `name` (relative, absolute or private) of the type

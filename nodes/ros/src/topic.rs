@@ -2,12 +2,13 @@
 
 use std::collections::VecDeque;
 use std::marker::PhantomData;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ros2_client::Gid;
 use swath_msgs::RosMessage;
 
+use crate::drops::Drops;
 use crate::endpoint::{RawPublisher, RawSample, RawSubscription, SampleInfo};
 use crate::error::RosError;
 use crate::graph::OPERATOR;
@@ -80,6 +81,8 @@ pub struct Subscription<M> {
     counts: Mutex<Option<(Gid, u64)>>,
     /// Messages of writers that are not known yet.
     parked: Mutex<VecDeque<RawSample>>,
+    /// What is dropped by order.
+    drops: Option<Arc<Drops>>,
     message: PhantomData<fn() -> M>,
 }
 
@@ -93,9 +96,9 @@ const PAUSES: [Duration; 2] = [Duration::from_millis(150), Duration::from_millis
 const PARKED: usize = 64;
 
 impl<M: RosMessage> Subscription<M> {
-    pub(crate) fn new(raw: RawSubscription, writers: &'static [&'static str]) -> Self {
+    pub(crate) fn new(raw: RawSubscription, writers: &'static [&'static str], drops: Option<Arc<Drops>>) -> Self {
         let writers = if writers.contains(&OPERATOR) { &[] } else { writers };
-        Self { raw, writers, counts: Mutex::default(), parked: Mutex::default(), message: PhantomData }
+        Self { raw, writers, counts: Mutex::default(), parked: Mutex::default(), drops, message: PhantomData }
     }
 
     /// The next message, if there is one.
@@ -128,6 +131,9 @@ impl<M: RosMessage> Subscription<M> {
             return Ok(Some(sample));
         }
         while let Some(sample) = self.raw.take()? {
+            if self.drops.as_ref().is_some_and(|drops| drops.takes(self.raw.topic(), self.raw.gid(), &sample)) {
+                continue;
+            }
             match self.standing(sample.info.writer) {
                 Standing::Counts => return Ok(Some(sample)),
                 Standing::Stranger => self.note_stranger(&sample),

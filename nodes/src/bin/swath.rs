@@ -30,6 +30,8 @@ enum Command {
     Alarms(operate::AlarmsArgs),
     /// Say how the radio of a flying mission stands.
     Link(operate::LinkArgs),
+    /// Let a wheel, a sensor or a node of a flying mission fail, as a drill or a test.
+    Fault(operate::FaultArgs),
     /// Say when stations see the satellite of a mission, from its file alone.
     Passes(passes::PassesArgs),
     /// Show a flying or a recorded mission as a page in a browser.
@@ -61,6 +63,7 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Planner(args) => operate::run_planner(&args, ros)?,
         Command::Alarms(args) => operate::run_alarms(&args, ros)?,
         Command::Link(args) => operate::run_link(&args, ros)?,
+        Command::Fault(args) => operate::run_fault(&args, ros)?,
         Command::Passes(args) => passes::run(&args)?,
         Command::Console(args) => swath_console::run(&args, ros)?,
         Command::Bridge(args) => swath_bridge::run(&args, ros)?,

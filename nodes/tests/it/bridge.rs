@@ -61,6 +61,9 @@ fn foxglove_sees_a_flying_mission_and_commands_it_where_it_may() {
     assert_eq!(saw["frames"], json!(["body", "ecef", "orbit"]));
     assert!(saw["latitude"].as_f64().unwrap().abs() <= 45.1, "{saw}");
     assert!(saw["strips"]["accepted"].as_u64().unwrap() > 50, "{saw}");
+    let scene = &saw["scene"];
+    assert_eq!((&scene["frames"], &scene["spheres"]), (&json!(["ecef"]), &json!(["earth"])), "{saw}");
+    assert!(scene["lines"]["accepted"].as_u64().unwrap() > 50, "{saw}");
     assert!(saw["refused"][0].as_str().unwrap().contains("clientPublish"), "{saw}");
 
     let saw = commands.saw("commands");

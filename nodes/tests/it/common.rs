@@ -11,6 +11,12 @@ pub fn domain() -> String {
     (100 + (first + u32::from(NEXT.fetch_add(1, Ordering::Relaxed))) % 130).to_string()
 }
 
+/// An address of this machine that nobody uses.
+pub fn address() -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.local_addr().unwrap().to_string()
+}
+
 /// A program of this suite: cargo puts those of all its packages beside `swath`, but builds for a test only those of the
 /// test's own package.
 pub fn program(name: &str) -> PathBuf {

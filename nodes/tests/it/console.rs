@@ -10,11 +10,6 @@ use swath_mission::time_text;
 
 use crate::common;
 
-fn address() -> String {
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    listener.local_addr().unwrap().to_string()
-}
-
 fn pictures() -> PathBuf {
     std::env::var_os("SWATH_PICTURES").map_or_else(|| Path::new(env!("CARGO_TARGET_TMPDIR")).to_owned(), PathBuf::from)
 }
@@ -41,7 +36,7 @@ struct Replay(Child, String);
 
 impl Replay {
     fn of(bag: &Path, domain: &str) -> Self {
-        let mut command = common::swath(domain, &["console", "--listen", &address(), "--bag"]);
+        let mut command = common::swath(domain, &["console", "--listen", &common::address(), "--bag"]);
         let mut child = command.arg(bag).stdout(Stdio::piped()).spawn().unwrap();
         let mut url = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut url).unwrap();
@@ -58,7 +53,7 @@ impl Drop for Replay {
 
 #[test]
 fn an_operators_day_in_the_console_alone() {
-    let (folder, domain, address) = (tempfile::tempdir().unwrap(), common::domain(), address());
+    let (folder, domain, address) = (tempfile::tempdir().unwrap(), common::domain(), common::address());
     let mission = common::write_mission(folder.path(), common::QUIET);
     let out = folder.path().join("out");
     let mut launch = common::swath(&domain, &["launch", "--console", &address, "--out"]);
@@ -101,4 +96,22 @@ fn an_operators_day_in_the_console_alone() {
         let shown: BTreeMap<String, u64> = serde_json::from_value(pair[1].clone()).unwrap();
         assert_eq!(shown, states_at(&trail, pair[0].as_f64().unwrap()), "at {}", pair[0]);
     }
+}
+
+#[test]
+fn ten_tabs_miss_a_node_that_is_away_until_it_is_back() {
+    let (folder, domain, address) = (tempfile::tempdir().unwrap(), common::domain(), common::address());
+    let away = "\n[supervision]\nbackoff_s = 20.0\nbackoff_max_s = 20.0\n";
+    let mission = common::write_mission(folder.path(), &format!("{}{away}", common::QUIET));
+    let mut launch = common::swath(&domain, &["launch", "--console", &address, "--no-bag", "--out"]);
+    let _flight = common::Running::start(launch.arg(folder.path().join("out")).arg(&mission));
+    common::until("the console", || std::net::TcpStream::connect(&address).ok());
+    let mut look = common::python("console_missing.py", &format!("http://{address}"));
+    let saw = saw(look.arg(pictures()).args([&domain, "guidance", "swath-guidance"]));
+    eprintln!("a node that is away: {saw}");
+    // HTTP/1.1 allows a browser six connections: all tabs share one stream.
+    assert_eq!(saw["tabs"], 10);
+    assert!((1..=6).contains(&saw["connections"].as_u64().unwrap()), "{saw}");
+    // The launcher tells it: DDS knows of a process that is gone only after it is back.
+    assert!(saw["back"].as_f64().unwrap() > saw["missing"].as_f64().unwrap(), "{saw}");
 }

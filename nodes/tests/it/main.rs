@@ -5,15 +5,20 @@ mod alarms;
 mod bad_input;
 mod bag;
 mod bridge;
+mod chaos;
 mod citizens;
 mod clients;
 mod common;
 mod console;
 mod datagrams;
+mod described;
+mod drill;
 mod examples;
+mod fault_orders;
 #[path = "../../examples/common/flight.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod flight;
+mod full;
 mod habits;
 mod killed;
 mod operators_day;

@@ -34,6 +34,12 @@ fn journal(out: &Path) -> Vec<Value> {
     common::json_lines(&std::fs::read_to_string(out.join("alarms.jsonl")).unwrap_or_default())
 }
 
+/// What happened to an alarm.
+fn events(out: &Path, name: &str) -> Vec<String> {
+    let of = |it: &Value| (it["name"] == name).then(|| it["event"].as_str().unwrap().to_owned());
+    journal(out).iter().filter_map(of).collect()
+}
+
 /// Waits until the mission has flown some tasks more.
 fn until_it_flies(out: &Path) {
     let before = tasks(out).len();
@@ -93,6 +99,30 @@ fn whichever_node_is_killed_or_stopped_another_one_goes_on() {
 }
 
 #[test]
+fn a_node_that_is_silent_for_a_while_is_warned_of_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "orbits = 60.0\npace = 200.0\nseed = 5\nplanner = \"heuristic:90\"\n";
+    let mission = common::write_mission(folder.path(), text);
+    let out = folder.path().join("out");
+    let mut flight = common::Running::start(launch(&common::domain(), &mission, &out).arg("--no-bag"));
+    until_it_flies(&out);
+    let pid = common::until("guidance", || process("swath-guidance", &out));
+    kill_process(pid, Signal::STOP).unwrap();
+    let stopped = Instant::now();
+    common::until("the warning", || (!events(&out, "guidance silent").is_empty()).then_some(()));
+    println!("warned after {:.2} s", stopped.elapsed().as_secs_f64());
+    kill_process(pid, Signal::CONT).unwrap();
+    common::until("the end of the warning", || (events(&out, "guidance silent").len() > 1).then_some(()));
+    until_it_flies(&out);
+    flight.stop();
+    assert_eq!(events(&out, "guidance silent"), ["raised", "returned"]);
+    assert!(events(&out, "guidance lost").is_empty());
+    let journal = journal(&out);
+    let warned = journal.iter().find(|it| it["name"] == "guidance silent").unwrap();
+    assert_eq!(warned["severity"], "warn");
+}
+
+#[test]
 fn a_planner_that_is_lost_again_and_again_leads_to_safe_mode_until_an_operator_ends_it() {
     let folder = tempfile::tempdir().unwrap();
     let text = "orbits = 60.0\npace = 200.0\nseed = 5\nplanner = \"heuristic:90\"\n[requests.random]\n\
@@ -117,8 +147,10 @@ fn a_planner_that_is_lost_again_and_again_leads_to_safe_mode_until_an_operator_e
     common::until("imaging again", || {
         tasks(&out)[held..].iter().any(|it| it["success"] == true && !holds(it)).then_some(())
     });
+    common::until("the end of safe mode", || (events(&out, "safe mode").len() == 2).then_some(()));
     kill_process(Pid::from_raw(flight.id() as i32).unwrap(), Signal::INT).unwrap();
     assert_eq!(flight.wait().unwrap().code(), Some(4));
+    assert_eq!(events(&out, "safe mode"), ["raised", "returned"]);
     let journal = journal(&out);
     let safe = journal.iter().find(|it| it["name"] == "safe mode").unwrap();
     assert_eq!((&safe["event"], &safe["severity"]), (&"raised".into(), &"critical".into()));

@@ -4,21 +4,15 @@ The browser is real, the mission flies, and two tabs look at it. Pictures of the
 """
 
 import json
-import os
-import shutil
-import signal
 import sys
 import time
 from pathlib import Path
 
 import ahead
+import browser
 from playwright.sync_api import expect, sync_playwright
 
 URL, FOLDER, DOMAIN = sys.argv[1], Path(sys.argv[2]), sys.argv[3]
-NAMES = ["chromium", "chromium-browser", "google-chrome"]
-CHROMIUM = os.environ.get("SWATH_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-if CHROMIUM is None:
-    sys.exit("no Chromium to look at the console with: apt-get install chromium, or set SWATH_CHROMIUM")
 # Another tab shows within a second what one did; machines that test may be slow.
 SOON = 20_000
 SAW = {"elsewhere": [], "errors": [], "seconds": {}}
@@ -121,6 +115,17 @@ def drop(page):
     picture(page, "dropped")
     page.get_by_role("button", name="submit", exact=True).click()
     message(page, "2 accepted", "1 refused", "latitude")
+
+
+def by_submitter(page):
+    """What a program ordered, and nothing that was drawn."""
+    tab(page, "requests")
+    page.get_by_label("filter by text").fill("")
+    page.get_by_label("filter by submitter").select_option(label="stapi")
+    names = page.locator(".rows .row span:nth-child(2)")
+    expect(names.filter(has_text="by STAPI").first).to_be_visible(timeout=SOON)
+    expect(names.filter(has_text="drawn by hand")).to_have_count(0)
+    page.get_by_label("filter by submitter").select_option(label="everybody's")
 
 
 def focused(page):
@@ -261,26 +266,11 @@ def planner(page, other):
     seen("autonomous", pressed("autonomous"), visible)
 
 
-def kill(name):
-    """Ends one of this mission's processes as kill -9 does."""
-    found = []
-    for process in Path("/proc").iterdir():
-        try:
-            command = (process / "cmdline").read_bytes().split(b"\0")[0].decode()
-            environment = (process / "environ").read_bytes().split(b"\0")
-        except (OSError, UnicodeDecodeError):
-            continue
-        if command.endswith(name) and f"ROS_DOMAIN_ID={DOMAIN}".encode() in environment:
-            found.append(int(process.name))
-    assert len(found) == 1, (name, found)
-    os.kill(found[0], signal.SIGKILL)
-
-
 def node_dies(page, other):
     """The request manager is killed: both tabs see that it came back and are told, and what was asked for is kept."""
     tab(page, "alarms")
     tab(other, "alarms")
-    kill("swath-requests")
+    browser.kill("swath-requests", DOMAIN)
     again = lambda it: it.to_contain_text("request_manager · 1 restart", timeout=60_000)
     again(expect(page.locator(".nodes")))
     seen("restart", other.locator(".nodes"), again)
@@ -293,6 +283,16 @@ def node_dies(page, other):
     expect(state(page)).to_have_text("completed", timeout=SOON)
 
 
+def front(page):
+    """The README's picture: a mission that flies, with a strip in hand, and the same on the globe."""
+    find(page, "drawn by hand")
+    page.get_by_label("filter by text").fill("")
+    page.get_by_role("button", name="whole").first.click()
+    picture(page, "console")
+    page.get_by_role("button", name="globe").click()
+    picture(page, "live")
+
+
 def day(page, other):
     for it in (page, other):
         it.goto(URL)
@@ -301,6 +301,7 @@ def day(page, other):
     draw(page)
     by_keyboard(other)
     drop(page)
+    by_submitter(page)
     decide_on_held(page, other)
     find(page, "drawn by hand")
     expect(state(page)).to_have_text("completed", timeout=120_000)
@@ -309,14 +310,13 @@ def day(page, other):
     executing(page)
     planner(page, other)
     node_dies(page, other)
-    page.get_by_role("button", name="globe").click()
-    picture(page, "live")
+    front(page)
 
 
 def main():
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        context = browser.new_context(viewport={"width": 1500, "height": 900})
+        chromium = browser.launch(playwright)
+        context = chromium.new_context(viewport={"width": 1500, "height": 900})
         context.on("request", lambda it: None if it.url.startswith(URL) else SAW["elsewhere"].append(it.url))
         pages = [context.new_page(), context.new_page()]
         for page in pages:
@@ -328,7 +328,7 @@ def main():
             for i, page in enumerate(pages):
                 page.screenshot(path=FOLDER / f"failed-{i}.png")
             raise
-        browser.close()
+        chromium.close()
     print(json.dumps(SAW))
 
 

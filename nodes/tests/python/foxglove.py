@@ -3,11 +3,15 @@
 It speaks Foxglove's WebSocket protocol (foxglove.sdk.v1) and decodes with mcap-ros2-support.
 """
 
+import base64
 import json
 import struct
 import sys
 import time
 
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 from websockets.sync.client import connect
 
@@ -100,10 +104,27 @@ class Client:
 
 def strips(client):
     """How many strips the channels of states show, by the last message of each."""
-    topics = [it for it in client.channels if "/strips/" in it]
+    topics = [it for it in client.channels if "/strips/" in it and not it.endswith("/scene")]
     client.subscribe(topics)
     client.hear(10, lambda: all(topic in client.messages for topic in topics))
     return {topic.rsplit("/", 1)[1]: len(client.last(topic)["features"]) for topic in topics}
+
+
+def scene(client):
+    """What a 3D panel draws: frame, entities, and how many lines each has."""
+    topic = next(it for it in client.channels if it.endswith("/strips/scene"))
+    channel = client.channels[topic]
+    assert channel["encoding"] == "protobuf", channel
+    pool = DescriptorPool()
+    for file in FileDescriptorSet.FromString(base64.b64decode(channel["schema"])).file:
+        pool.Add(file)
+    kind = GetMessageClass(pool.FindMessageTypeByName(channel["schemaName"]))
+    client.subscribe([topic])
+    client.hear(10, lambda: topic in client.messages)
+    update = kind.FromString(client.messages[topic][-1][1])
+    frames = sorted({it.frame_id for it in update.entities})
+    lines = {it.id: sum(len(line.points) // 2 for line in it.lines) for it in update.entities}
+    return {"frames": frames, "spheres": [it.id for it in update.entities if it.spheres], "lines": lines}
 
 
 def topics():
@@ -121,6 +142,7 @@ def live():
     saw["schemas"] = all(it["schemaEncoding"] == "ros2msg" for it in client.channels.values() if it["encoding"] == "cdr")
     saw["topics"] = sorted(client.channels)
     saw["strips"] = strips(client)
+    saw["scene"] = scene(client)
     # Subscribed, and never read: its queue is full soon.
     stuck = Client()
     stuck.hear(20, lambda: "/swath/spacecraft/state" in stuck.channels)
@@ -137,7 +159,8 @@ def live():
     saw["ticks"] = [state.tick for state in states]
     saw["frames"] = sorted({it.child_frame_id for it in client.last("/tf").transforms})
     saw["latitude"] = client.last(wanted[1]).latitude
-    saw["decoded"] = sum(1 for topic in client.messages if client.last(topic) is not None)
+    ours = [topic for topic in client.messages if not topic.endswith("/scene")]
+    saw["decoded"] = sum(1 for topic in ours if client.last(topic) is not None)
     stamp = client.messages["/clock"][-1][0]
     saw["clock"] = abs(client.time - stamp) < 3600e9 and stamp > 1.7e18
     # Not allowed: neither is advertised, and who tries is told.

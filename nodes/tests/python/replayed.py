@@ -1,15 +1,12 @@
 """What a replay in the console shows at several times: python replayed.py CONSOLE MS ...; prints states as JSON."""
 
 import json
-import os
-import shutil
 import sys
 
+import browser
 from playwright.sync_api import sync_playwright
 
 URL, TIMES = sys.argv[1], [float(it) for it in sys.argv[2:]]
-NAMES = ["chromium", "chromium-browser", "google-chrome"]
-CHROMIUM = os.environ.get("SWATH_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
 
 
 def legend(page):
@@ -20,8 +17,8 @@ def legend(page):
 
 def main():
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1500, "height": 900})
+        chromium = browser.launch(playwright)
+        page = chromium.new_page(viewport={"width": 1500, "height": 900})
         page.goto(URL)
         page.wait_for_selector(".rows .row", timeout=60_000)
         slider = page.locator('input[type="range"]')
@@ -31,7 +28,7 @@ def main():
             slider.evaluate(move, time_ms)
             page.wait_for_timeout(400)
             saw["states"].append([float(slider.input_value()), legend(page)])
-        browser.close()
+        chromium.close()
     print(json.dumps(saw))
 
 

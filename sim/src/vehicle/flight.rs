@@ -213,7 +213,7 @@ impl Flight {
 }
 
 /// The spacecraft as its executive is told of it.
-#[inline]
+#[inline(always)]
 fn sight(spacecraft: &mut Spacecraft) -> Sight<'_> {
     let now = spacecraft.now;
     let r_BN_N = spacecraft.orbit.position(now);

@@ -48,8 +48,7 @@ pub struct Guidance {
     law: ControlLaw,
     plant: Plant,
     limits: ImagingLimits,
-    earth: Turn,
-    earth_radius: f64,
+    ground: Ground,
     dt: f64,
     axes: Option<Axes>,
     /// Rate-error integral z of the servo [rad]; persists from task to task.
@@ -81,6 +80,35 @@ impl Axes {
             antenna_B: Vector3::from(resources.antenna_axis_b).normalize(),
             sun_N: *sun.direction_N(),
         })
+    }
+}
+
+/// The turning Earth whose strips are followed.
+#[derive(Clone, Debug)]
+struct Ground {
+    earth: Turn,
+    radius: f64,
+    /// Length of a tick [s].
+    dt: f64,
+}
+
+impl Ground {
+    /// σ_BR and the sine of the elevation while following a strip that is imaged from a tick on.
+    #[inline]
+    fn track(
+        &mut self,
+        strip: &Strip,
+        imaged_from: Tick,
+        now: Tick,
+        r_BN_N: &Vector3<f64>,
+        body: &BodyState,
+    ) -> (Vector3<f64>, f64) {
+        let elapsed = now.since(imaged_from) as f64 * self.dt;
+        let (target_N, scan_N) = strip.target_N(elapsed, self.earth.cos_sin(now), self.radius);
+        let rn = mrp::euler_parameters_from_dcm(&reference_dcm(r_BN_N, &target_N, &scan_N));
+        let bn = mrp::to_euler_parameters(&body.sigma_BN);
+        let sigma_BR = mrp::from_euler_parameters(&mrp::relative_euler_parameters(&bn, &rn));
+        (sigma_BR, sin_elevation(r_BN_N, &target_N))
     }
 }
 
@@ -157,8 +185,7 @@ impl Guidance {
                 sin_elevation_min: libm::sin(config.imaging.elevation_min_deg.to_radians()),
                 required_fraction: config.imaging.required_fraction,
             },
-            earth: model.earth.clone(),
-            earth_radius: config.earth.radius_m,
+            ground: Ground { earth: model.earth.clone(), radius: config.earth.radius_m, dt: model.period.seconds() },
             dt: model.period.seconds(),
             axes: Axes::new(model),
             servo_integral: Vector3::zeros(),
@@ -195,8 +222,8 @@ impl Guidance {
     pub fn finish(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState) -> Option<TaskOutcome> {
         let mut active = self.active.take()?;
         let interrupted = now < active.start.after(active.task.ticks());
-        if let (Task::Image { strip, t_pre, .. }, false) = (active.task, interrupted) {
-            let (sigma_BR, sin_el) = self.track(&strip, active.start, t_pre, now, r_BN_N, body);
+        if let (Task::Image { strip, t_pre, .. }, false) = (&active.task, interrupted) {
+            let (sigma_BR, sin_el) = self.ground.track(strip, active.start.after(*t_pre), now, r_BN_N, body);
             active.record.add(&self.limits, sigma_BR.norm_squared(), sin_el);
         }
         Some(active.record.outcome(&self.limits, interrupted))
@@ -205,14 +232,15 @@ impl Guidance {
     /// One control tick: the torque command computed from the state at `now`. Without a task the torque is zero.
     #[inline]
     pub fn tick(&mut self, now: Tick, r_BN_N: &Vector3<f64>, body: &BodyState) -> GuidanceTick {
-        let Some(mut active) = self.active.take() else {
+        let Some(active) = &mut self.active else {
             return GuidanceTick::IDLE;
         };
         let mut boresight_B = None;
-        let (sigma_BR, sin_elevation, imaging) = match active.task {
+        let (sigma_BR, sin_elevation, imaging) = match &active.task {
             Task::Image { strip, t_pre, .. } => {
-                let (sigma_BR, sin_el) = self.track(&strip, active.start, t_pre, now, r_BN_N, body);
-                let imaging = now >= active.start.after(t_pre);
+                let imaged_from = active.start.after(*t_pre);
+                let (sigma_BR, sin_el) = self.ground.track(strip, imaged_from, now, r_BN_N, body);
+                let imaging = now >= imaged_from;
                 if imaging {
                     active.record.add(&self.limits, sigma_BR.norm_squared(), sin_el);
                 }
@@ -241,7 +269,6 @@ impl Guidance {
         }
         active.previous_sigma = Some(sigma_BR);
         let waits = matches!(active.task, Task::Wait { .. });
-        self.active = Some(active);
         let error = TrackingError { sigma_BR, omega_BR_B };
         if self.wheel_lost && (waits || body.omega_BN_B.norm() > DAMPED_FROM * self.law.omega_max()) {
             let torque = self.plant.wheels.saturate(&self.law.damping(&body.omega_BN_B), &body.wheel_speed);
@@ -250,25 +277,6 @@ impl Guidance {
         let integral = &mut self.servo_integral;
         let command = self.law.torque(&self.plant, &error, &body.omega_BN_B, &body.wheel_speed, integral, self.dt);
         GuidanceTick { torque: self.plant.wheels.saturate(&command, &body.wheel_speed), error, sin_elevation, imaging }
-    }
-
-    /// σ_BR and the sine of the elevation while following a strip.
-    #[inline]
-    fn track(
-        &mut self,
-        strip: &Strip,
-        start: Tick,
-        t_pre: u32,
-        now: Tick,
-        r_BN_N: &Vector3<f64>,
-        body: &BodyState,
-    ) -> (Vector3<f64>, f64) {
-        let elapsed = now.since(start.after(t_pre)) as f64 * self.dt;
-        let (target_N, scan_N) = strip.target_N(elapsed, self.earth.cos_sin(now), self.earth_radius);
-        let rn = mrp::euler_parameters_from_dcm(&reference_dcm(r_BN_N, &target_N, &scan_N));
-        let bn = mrp::to_euler_parameters(&body.sigma_BN);
-        let sigma_BR = mrp::from_euler_parameters(&mrp::relative_euler_parameters(&bn, &rn));
-        (sigma_BR, sin_elevation(r_BN_N, &target_N))
     }
 }
 

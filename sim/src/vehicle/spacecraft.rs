@@ -173,7 +173,7 @@ impl Spacecraft {
     }
 
     /// The same, while imager, transmitter and thrusters do something.
-    #[inline]
+    #[inline(always)]
     pub fn advance_doing(&mut self, command: &Vector3<f64>, activity: Activity) {
         if self.onboard.is_some() {
             self.live(command, activity);
@@ -190,8 +190,8 @@ impl Spacecraft {
         }
     }
 
-    /// A tick with torques from outside, and its books.
-    #[inline]
+    /// A tick with torques from outside, and its books. Not inlined: without resources a tick is small.
+    #[inline(never)]
     fn live(&mut self, command: &Vector3<f64>, activity: Activity) {
         let Some(onboard) = &mut self.onboard else { return };
         let then = self.now.after(1);

@@ -36,6 +36,7 @@ pub fn all(node: &Node) -> Result<Vec<Service>> {
         offer(node, &graph::SHELVE_ALARM)?,
         offer(node, &graph::UNSHELVE_ALARM)?,
         offer(node, &graph::LIST_ALARMS)?,
+        offer(node, &graph::ORDER_FAULT)?,
     ])
 }
 

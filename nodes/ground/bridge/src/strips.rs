@@ -8,13 +8,16 @@ use foxglove::{ChannelBuilder, Context, Encode as _, RawChannel};
 use serde_json::{Value, json};
 use swath_mission::requests::lifecycle::State;
 use swath_msgs::swath_msgs::StripStatus;
+use swath_node::stamp::{EARTH_FRAME, frame_in};
 
 use crate::latched::{Kept, send_latched};
+use crate::scene::{Ends, Scene};
 
 /// A strip as a map draws it.
 struct Drawn {
     state: State,
     feature: Value,
+    ends: Ends,
 }
 
 /// All strips that are known, and what of them is not told yet.
@@ -25,21 +28,33 @@ pub struct Strips {
     channels: BTreeMap<u8, Arc<RawChannel>>,
     known: BTreeMap<u64, Drawn>,
     changed: BTreeSet<u8>,
+    scene: Scene,
 }
 
 impl Strips {
     /// None yet.
     #[must_use]
     pub fn new(context: &Arc<Context>, kept: Arc<Kept>, namespace: &str) -> Self {
-        let (context, namespace) = (Arc::clone(context), namespace.to_owned());
-        Self { context, kept, namespace, channels: BTreeMap::new(), known: BTreeMap::new(), changed: BTreeSet::new() }
+        let frame = frame_in(namespace, EARTH_FRAME);
+        Self {
+            scene: Scene::new(context, Arc::clone(&kept), namespace, frame),
+            context: Arc::clone(context),
+            kept,
+            namespace: namespace.to_owned(),
+            channels: BTreeMap::new(),
+            known: BTreeMap::new(),
+            changed: BTreeSet::new(),
+        }
     }
 
     /// Takes in how a strip stands.
     pub fn take(&mut self, status: &StripStatus) {
         let Some(state) = State::from_number(status.state).filter(|_| status.strip.id != 0) else { return };
         self.changed.insert(state.number());
-        let drawn = Drawn { state, feature: feature(status) };
+        let strip = &status.strip;
+        let ends =
+            [[strip.start_longitude_deg, strip.start_latitude_deg], [strip.end_longitude_deg, strip.end_latitude_deg]];
+        let drawn = Drawn { state, feature: feature(status), ends };
         if let Some(before) = self.known.insert(status.strip.id, drawn) {
             self.changed.insert(before.state.number());
         }
@@ -53,6 +68,9 @@ impl Strips {
 
     /// Tells of the states in which something has changed, each as a whole.
     pub fn tell(&mut self, log_time: u64) {
+        if !self.changed.is_empty() {
+            self.scene.tell(&self.groups(), log_time);
+        }
         for state in std::mem::take(&mut self.changed) {
             let Some(channel) = self.channel(state) else { continue };
             let of_state = self.known.values().filter(|drawn| drawn.state.number() == state);
@@ -64,6 +82,19 @@ impl Strips {
                 Err(error) => tracing::warn!("strips cannot be told: {error}"),
             }
         }
+    }
+
+    /// The strips of each state, with its colour.
+    fn groups(&self) -> BTreeMap<&'static str, (&'static str, Vec<Ends>)> {
+        // A state that nothing is in any more is told as well: it is drawn as nothing then.
+        let mut groups: BTreeMap<_, _> =
+            State::ALL.into_iter().map(|state| (state.name(), (colour(state.number()), Vec::new()))).collect();
+        for drawn in self.known.values() {
+            if let Some((_, strips)) = groups.get_mut(drawn.state.name()) {
+                strips.push(drawn.ends);
+            }
+        }
+        groups
     }
 
     /// The channel of a state, `strips/accepted` and so on, made when it is needed first.
@@ -93,12 +124,16 @@ const COLOURS: [&str; 13] = [
     "#d55e00", "#6c7a89", "#17b88a",
 ];
 
+fn colour(state: u8) -> &'static str {
+    COLOURS.get(usize::from(state)).copied().unwrap_or("#ff00ff")
+}
+
 /// A strip as a feature. A line across the 180th meridian goes on beyond it: a map would draw it round the Earth.
 fn feature(status: &StripStatus) -> Value {
     let strip = &status.strip;
     let from = strip.start_longitude_deg;
     let to = from + (strip.end_longitude_deg - from + 180.0).rem_euclid(360.0) - 180.0;
-    let colour = COLOURS.get(usize::from(status.state)).copied().unwrap_or("#ff00ff");
+    let colour = colour(status.state);
     json!({
         "type": "Feature",
         "id": strip.id,

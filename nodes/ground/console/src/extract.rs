@@ -1,5 +1,6 @@
 //! What handlers take from a request, with problem details where it is not there; and JSON as they answer.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Bytes;
@@ -13,6 +14,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::guard::media_type;
+use crate::guests::Guest;
 use crate::problem::Problem;
 
 /// How long a request's body may take to arrive.
@@ -28,7 +30,11 @@ impl<S: Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
 
     async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
         media_type(request.headers(), &["application/json", "application/geo+json"])?;
+        let guest = request.extensions().get::<Arc<Guest>>().cloned();
         let body = read(request).await?;
+        if let Some(guest) = guest {
+            guest.busy();
+        }
         let parsed = serde_json::from_slice(&body);
         parsed.map(Self).map_err(|error| Problem::bad(format!("the body is not what is expected: {error}")))
     }

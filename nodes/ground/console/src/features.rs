@@ -15,7 +15,9 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::extract::{GeoJson, Json, Named, Params};
+use crate::numbers::perhaps_whole;
 use crate::problem::Problem;
+use crate::schemas;
 use crate::server::{Home, Server};
 use crate::shapes::{Ends, bbox, line};
 
@@ -115,19 +117,21 @@ async fn collection(State(server): Home, headers: HeaderMap, Named(id): Named<St
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct Which {
-    /// Most strips of a page.
-    #[param(minimum = 1, maximum = 10_000)]
+    /// Most strips of a page; more than 10 000 are 10 000.
+    #[param(minimum = 1)]
     limit: Option<usize>,
     /// Only strips with greater numbers.
+    #[serde(default, deserialize_with = "perhaps_whole")]
     #[param(minimum = 0)]
     after: Option<u64>,
     /// West, south, east, north [deg].
-    #[param(example = "-180,-90,180,90")]
+    #[param(schema_with = schemas::bounding_box)]
     bbox: Option<String>,
     /// Only strips that last changed at this simulated time or in this interval.
-    #[param(example = "2026-01-01T00:00:00Z/..")]
+    #[param(schema_with = schemas::time_or_interval)]
     datetime: Option<String>,
     /// Only strips in this state.
+    #[param(schema_with = schemas::state)]
     state: Option<String>,
 }
 
@@ -278,7 +282,7 @@ fn escaped(text: &str) -> String {
 
 /// A strip.
 #[utoipa::path(get, path = "/collections/{collection}/items/{item}", tag = "features",
-    params(("collection" = String, Path, example = "strips"), ("item" = String, Path)),
+    params(("collection" = String, Path, example = "strips"), ("item" = String, Path, example = "1")),
     responses((status = 200, description = "as asked", body = Value, content_type = "application/geo+json"), Problem))]
 async fn item(
     State(server): Home,

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use axum::Router;
 use axum::http::header::CONTENT_TYPE;
 use hyper::Request;
-use hyper::body::Incoming;
+use hyper::body::{Body as _, Incoming};
 use hyper::server::conn::http1;
 use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -18,6 +18,7 @@ use hyper_util::service::TowerToHyperService;
 use rustls::ServerConfig;
 use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use socket2::{Domain, Protocol, Socket, Type};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
@@ -29,6 +30,8 @@ use crate::stream;
 
 /// Connections at a time.
 const CONNECTIONS: usize = 256;
+/// Connections that may wait to be taken; the standard library has 128, and who finds no room tries again a second later.
+const QUEUE: i32 = 4096;
 /// How long a request's head may take to arrive, and how long TLS may take to begin.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 /// How long to wait when connections cannot be taken.
@@ -44,9 +47,16 @@ pub fn listen(address: SocketAddr, tls: bool) -> Result<std::net::TcpListener> {
         "{address} can be reached from other machines: that needs --tls-cert, --tls-key and tokens \
          (swath console token add), or listen on 127.0.0.1 and use `ssh -L`"
     );
-    let listener = std::net::TcpListener::bind(address).with_context(|| format!("cannot listen on {address}"))?;
-    listener.set_nonblocking(true).context("cannot use the port without waiting")?;
-    Ok(listener)
+    let open = || -> std::io::Result<Socket> {
+        let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
+        // As the standard library does: a port is free again at once.
+        socket.set_reuse_address(true)?;
+        socket.bind(&address.into())?;
+        socket.listen(QUEUE)?;
+        socket.set_nonblocking(true)?;
+        Ok(socket)
+    };
+    Ok(open().with_context(|| format!("cannot listen on {address}"))?.into())
 }
 
 /// TLS with a certificate and its key, both in PEM.
@@ -111,8 +121,12 @@ where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
     let router = TowerToHyperService::new(router);
-    let answer = service_fn(move |request: Request<Incoming>| {
-        guest.busy();
+    let answer = service_fn(move |mut request: Request<Incoming>| {
+        // While a body is under way it waits; whoever reads it says when it has come.
+        if request.body().is_end_stream() {
+            guest.busy();
+        }
+        request.extensions_mut().insert(Arc::clone(&guest));
         let (answer, guest) = (router.call(request), Arc::clone(&guest));
         async move {
             let answer = answer.await?;

@@ -9,13 +9,19 @@ use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs as msg;
 use swath_node::stamp::nanoseconds;
+use swath_ros::graph;
 
 use crate::facts::{self, Fact, milliseconds};
+use crate::presence::Presence;
 
 /// Most facts that are kept: a week of telemetry every ten seconds with 5 000 requests has a tenth of it.
 const CAPACITY: usize = 5_000_000;
 
+/// Nodes that are missed only once they have been there: a mission can be flown without.
+const BESIDES: [&str; 2] = [graph::LAUNCHER, graph::RECORDER];
+
 /// The facts, each as a line of JSON.
+#[derive(Default)]
 pub struct Ledger {
     lines: Vec<Arc<str>>,
     /// Time of the newest fact [ms].
@@ -32,7 +38,7 @@ pub struct Ledger {
     aside: BTreeMap<u64, (String, String)>,
     /// Until when an alarm was told to be put aside [ms], by its number.
     until: BTreeMap<u64, f64>,
-    present: Option<Fact>,
+    presence: Presence,
     /// How each request stands.
     requests: BTreeMap<u64, msg::StripStatus>,
     tasks: u64,
@@ -74,27 +80,6 @@ impl TickClock {
         }
         self.told = Some(learnt);
         Some(learnt)
-    }
-}
-
-impl Default for Ledger {
-    fn default() -> Self {
-        Self {
-            lines: Vec::new(),
-            now_ms: 0.0,
-            clock: TickClock::default(),
-            told: BTreeMap::new(),
-            alarms: BTreeMap::new(),
-            acknowledged: BTreeSet::new(),
-            kept: false,
-            aside: BTreeMap::new(),
-            until: BTreeMap::new(),
-            present: None,
-            requests: BTreeMap::new(),
-            tasks: 0,
-            results: 0,
-            offers: 0,
-        }
     }
 }
 
@@ -301,6 +286,7 @@ impl Ledger {
     pub fn standing(&mut self, standing: &msg::StandingAlarms) {
         use msg::Alarm;
         self.kept = true;
+        self.presence.standing(standing);
         for alarm in &standing.alarms {
             let name = format!("{}: {}", alarm.node, alarm.name);
             let known = self.alarms.contains_key(&(name.clone(), String::new()));
@@ -382,15 +368,10 @@ impl Ledger {
         true
     }
 
-    /// The nodes that are there, of those that should be, and how often each was started anew; told when it changes.
-    pub fn nodes(&mut self, present: BTreeSet<String>, expected: &[&str], epochs: BTreeMap<String, u64>) {
-        let present: Vec<_> = present.into_iter().filter(|name| expected.contains(&name.as_str())).collect();
-        let missing = expected.iter().map(|name| (*name).to_owned()).filter(|name| !present.contains(name)).collect();
-        let again = epochs.into_iter().filter(|(name, epoch)| *epoch > 0 && expected.contains(&name.as_str()));
-        let nodes = Fact::Nodes { present, missing, restarts: again.collect() };
-        if self.present.as_ref() != Some(&nodes) {
+    /// Which nodes are there, of those that must be and those that come besides, and how often each was started anew.
+    pub fn nodes(&mut self, present: &BTreeSet<String>, epochs: BTreeMap<String, u64>) {
+        if let Some(nodes) = self.presence.look(present, &graph::FLIGHT_NODES, &BESIDES, epochs) {
             self.tell(self.now_ms, &nodes);
-            self.present = Some(nodes);
         }
     }
 }
@@ -540,24 +521,6 @@ mod tests {
         assert_eq!(kinds, ["alarm", "acknowledged", "returned", "alarm", "shelved", "shelved"]);
         assert_eq!((&all[4]["actor"], &all[4]["until_ms"]), (&json!("ada"), &json!(ms(60))));
         assert_eq!(all[5]["until_ms"], json!(0.0));
-    }
-
-    #[test]
-    fn nodes_are_told_when_they_come_or_go() {
-        let mut ledger = Ledger::default();
-        let here = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<BTreeSet<_>>();
-        let expected = ["guidance", "planner"];
-        let never = BTreeMap::new;
-        ledger.nodes(here(&["guidance", "planner", "console"]), &expected, never());
-        ledger.nodes(here(&["guidance", "planner"]), &expected, never());
-        ledger.nodes(here(&["planner"]), &expected, never());
-        let epochs = BTreeMap::from([("planner".to_owned(), 0), ("guidance".to_owned(), 1)]);
-        ledger.nodes(here(&["guidance", "planner"]), &expected, epochs);
-        let all = told(&ledger);
-        let missing: Vec<_> = all.iter().map(|fact| fact["missing"].clone()).collect();
-        assert_eq!(missing, [json!([]), json!(["guidance"]), json!([])]);
-        let restarts: Vec<_> = all.iter().map(|fact| fact["restarts"].clone()).collect();
-        assert_eq!(restarts, [json!({}), json!({}), json!({ "guidance": 1 })]);
     }
 
     #[test]

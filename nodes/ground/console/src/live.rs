@@ -84,7 +84,7 @@ impl Ear {
         if self.looked.is_none_or(|looked| looked.elapsed() >= LOOK) {
             self.looked = Some(Instant::now());
             let (present, epochs) = (members(node), node.epochs());
-            shared.update(|ledger| ledger.nodes(present, &graph::FLIGHT_NODES, epochs));
+            shared.update(|ledger| ledger.nodes(&present, epochs));
         }
         node.wait(IDLE)?;
         Ok(())

@@ -75,7 +75,7 @@ impl From<anyhow::Error> for Problem {
 /// In the description of the API: what may be answered instead of what was asked for.
 impl IntoResponses for Problem {
     fn responses() -> BTreeMap<String, RefOr<Described>> {
-        let statuses = [400, 401, 403, 404, 405, 408, 409, 411, 413, 415, 421, 422, 429, 502];
+        let statuses = [400, 401, 403, 404, 405, 408, 409, 411, 413, 415, 421, 422, 429, 502, 503];
         let one = |status: u16| {
             let meaning = StatusCode::from_u16(status).ok().and_then(|it| it.canonical_reason()).unwrap_or_default();
             let details = ContentBuilder::new().schema(Some(Ref::from_schema_name("ProblemDetails"))).build();

@@ -9,8 +9,11 @@ use axum::http::header::{CONTENT_TYPE, ETAG, IF_NONE_MATCH};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
-use utoipa::OpenApi;
+use tokio::sync::Semaphore;
 use utoipa::openapi::OpenApi as Description;
+use utoipa::openapi::path::Operation;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa::{Modify, OpenApi};
 use utoipa_axum::router::OpenApiRouter;
 
 use crate::api;
@@ -20,6 +23,7 @@ use crate::features;
 use crate::problem::{Problem, ProblemDetails};
 use crate::server::{Home, Server, Site};
 use crate::stapi;
+use crate::stream;
 use crate::tokens::Role;
 
 #[derive(OpenApi)]
@@ -29,6 +33,8 @@ use crate::tokens::Role;
         description = "What the ground knows of a mission, and what can be asked of it. Times are simulated UTC.",
     ),
     components(schemas(ProblemDetails)),
+    modifiers(&Tokens),
+    security((), ("token" = [])),
     tags(
         (name = "console", description = "What the page asks"),
         (name = "stapi", description = "Sensor Tasking API 0.1.0"),
@@ -37,25 +43,51 @@ use crate::tokens::Role;
 )]
 struct Whole;
 
-fn paths() -> OpenApiRouter<Arc<Server>> {
-    OpenApiRouter::with_openapi(Whole::openapi())
+/// How those prove who they are who are asked.
+struct Tokens;
+
+impl Modify for Tokens {
+    fn modify(&self, description: &mut Description) {
+        let bearer = HttpBuilder::new().scheme(HttpAuthScheme::Bearer).description(Some("not asked for on 127.0.0.1"));
+        let components = description.components.get_or_insert_default();
+        components.add_security_scheme("token", SecurityScheme::Http(bearer.build()));
+    }
+}
+
+/// What answers, and its description.
+fn paths() -> (Router<Arc<Server>>, Description) {
+    let router = OpenApiRouter::with_openapi(Whole::openapi())
         .merge(api::routes())
         .nest("/stapi", stapi::routes())
-        .nest("/features", features::routes())
+        .nest("/features", features::routes());
+    let (router, mut description) = router.split_for_parts();
+    for item in description.paths.paths.values_mut() {
+        for operation in [&mut item.get, &mut item.post, &mut item.delete].into_iter().flatten() {
+            name(operation);
+        }
+    }
+    (router, description)
+}
+
+/// Different doors have operations of the same name: each is called by its door, too.
+fn name(operation: &mut Operation) {
+    let door = operation.tags.iter().flatten().next().cloned().unwrap_or_default();
+    operation.operation_id = operation.operation_id.take().map(|id| format!("{door}_{id}"));
 }
 
 /// The description of every path.
 #[must_use]
 pub fn description() -> Description {
-    paths().split_for_parts().1
+    paths().1
 }
 
 /// All of it, guarded.
 pub fn router(site: Site) -> Router {
     let run = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis()).to_string();
-    let (router, description) = paths().split_for_parts();
+    let (router, description) = paths();
     let description = description.to_json().unwrap_or_default();
-    let server = Arc::new(Server { site, run, description, asked: Asked::default() });
+    let readers = Arc::new(Semaphore::new(stream::READERS));
+    let server = Arc::new(Server { site, run, description, asked: Asked::default(), readers });
     router
         .fallback(asset)
         .method_not_allowed_fallback(|method: Method| async move {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::extract::State;
 use axum::http::StatusCode;
+use tokio::sync::Semaphore;
 
 use crate::asked::Asked;
 use crate::desks::Counter;
@@ -35,6 +36,8 @@ pub struct Server {
     pub description: String,
     /// What was asked for, as far as it was looked up.
     pub asked: Asked,
+    /// Room for readers of the facts.
+    pub readers: Arc<Semaphore>,
 }
 
 impl Server {

@@ -1,10 +1,13 @@
 //! The facts as server-sent events: batches in order, from where the reader was, for as long as it reads.
 
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use http_body_util::channel::{Channel, Sender};
 use hyper::body::Bytes;
+use tokio::sync::OwnedSemaphorePermit;
 
+use crate::guests::Guest;
 use crate::shared::Shared;
 
 /// The media type of server-sent events.
@@ -13,8 +16,12 @@ pub const MEDIA_TYPE: &str = "text/event-stream";
 const BATCH: usize = 2000;
 /// Between events to a reader that has read everything: ten a second.
 const PAUSE: Duration = Duration::from_millis(100);
-/// A reader that is gone is noticed when something is written to it.
-const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+/// Readers at a time, of the connections that there are: others find room whoever reads.
+pub const READERS: usize = 192;
+/// How long a reader may take to read what was sent before it is sent away; it comes back where it was.
+const STUCK: Duration = Duration::from_secs(60);
+/// A reader that is gone is noticed when something is written to it; as often it is looked whether it still may read.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
 
 /// Where a reader was: how many facts it has read in which run of the server.
 #[must_use]
@@ -23,27 +30,62 @@ pub fn place(last_event_id: Option<&str>, run: &str) -> Option<usize> {
     if of == run { count.parse().ok() } else { None }
 }
 
+/// One who reads, for as long as it does.
+pub struct Reader {
+    /// The room that it takes.
+    pub room: OwnedSemaphorePermit,
+    /// Its connection.
+    pub guest: Option<Arc<Guest>>,
+    /// Whether it may still read: tokens end, or are revoked.
+    pub admitted: Box<dyn Fn() -> bool + Send + Sync>,
+}
+
 /// The body of an answer that tells the facts after `after`; a reader that was elsewhere begins anew.
-pub fn body(shared: Shared, run: String, after: Option<usize>) -> Channel<Bytes> {
+pub fn body(shared: Shared, run: String, after: Option<usize>, reader: Reader) -> Channel<Bytes> {
     let (sender, body) = Channel::new(1);
-    tokio::spawn(tell(shared, run, after, sender));
+    tokio::spawn(async move {
+        tell(shared, run, after, sender, &reader.admitted).await;
+        drop(reader.room);
+        // Its connection may never take what is still to be sent.
+        if let Some(guest) = reader.guest {
+            guest.waits();
+        }
+    });
     body
 }
 
-async fn tell(shared: Shared, run: String, after: Option<usize>, mut sender: Sender<Bytes>) {
+/// Whether a reader has taken what it is sent.
+async fn send(sender: &mut Sender<Bytes>, text: Bytes) -> bool {
+    matches!(tokio::time::timeout(STUCK, sender.send_data(text)).await, Ok(Ok(())))
+}
+
+async fn tell(
+    shared: Shared,
+    run: String,
+    after: Option<usize>,
+    mut sender: Sender<Bytes>,
+    admitted: &(dyn Fn() -> bool + Send + Sync),
+) {
     let mut news = shared.watch();
     let known = after.filter(|after| *after <= *news.borrow_and_update());
     let mut at = known.unwrap_or(0);
     // Data is needed for an event to count.
     let greeting = if known.is_some() { ": here you are\n\n" } else { "event: restart\ndata: 0\n\n" };
-    if sender.send_data(Bytes::from_static(greeting.as_bytes())).await.is_err() {
+    if !send(&mut sender, Bytes::from_static(greeting.as_bytes())).await {
         return;
     }
+    let mut looked = Instant::now();
     loop {
+        if looked.elapsed() >= SIGN_OF_LIFE {
+            looked = Instant::now();
+            if !admitted() {
+                return;
+            }
+        }
         let (last, facts) = shared.batch(at, BATCH);
         if last > at {
             let event = format!("event: facts\nid: {run}.{last}\ndata: {facts}\n\n");
-            if sender.send_data(event.into()).await.is_err() {
+            if !send(&mut sender, event.into()).await {
                 return;
             }
             if last - at < BATCH {
@@ -56,7 +98,7 @@ async fn tell(shared: Shared, run: String, after: Option<usize>, mut sender: Sen
             Ok(Ok(())) => {}
             Ok(Err(_)) => return,
             Err(_) => {
-                if sender.send_data(Bytes::from_static(b": still here\n\n")).await.is_err() {
+                if !send(&mut sender, Bytes::from_static(b": still here\n\n")).await {
                     return;
                 }
             }

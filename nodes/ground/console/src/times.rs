@@ -11,6 +11,9 @@ const FOREVER_NS: u64 = 9_000_000_000_000_000_000;
 /// When it is none, or ends before it starts.
 pub fn parse(text: &str) -> Result<(u64, u64), String> {
     let (start, end) = text.split_once('/').ok_or_else(|| format!("`{text}` is no interval START/END"))?;
+    if end.contains('/') {
+        return Err(format!("`{text}` has more than two ends"));
+    }
     let one = |text: &str| if text.is_empty() || text == ".." { Ok(0) } else { time_text::parse(text) };
     let (start, end) = (one(start)?, one(end)?);
     if end != 0 && end < start {
@@ -38,7 +41,8 @@ mod tests {
         assert_eq!(parse("2026-01-01T00:00:00Z/.."), Ok((day, 0)));
         assert_eq!(parse("/2026-01-01T00:00:00Z"), Ok((0, day)));
         assert_eq!(format(0, 0, day), "2026-01-01T00:00:00Z/2255-03-14T16:00:00Z");
-        for wrong in ["", "2026-01-01T00:00:00Z", "soon/later", "2026-01-02T00:00:00Z/2026-01-01T00:00:00Z"] {
+        for wrong in ["", "2026-01-01T00:00:00Z", "soon/later", "2026-01-02T00:00:00Z/2026-01-01T00:00:00Z", "../../.."]
+        {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
     }

@@ -11,7 +11,7 @@ use swath_sim::time::{Tick, TickPeriod};
 use super::messages;
 use swath_mission::alarms::conditions::{Report, report_all};
 use swath_mission::alarms::wishes::{Act, Wish};
-use swath_mission::alarms::{Board, Entry, Key, Severity};
+use swath_mission::alarms::{Board, Entry, Key};
 
 /// All alarms of a flying mission.
 pub struct FlyingBoard {
@@ -62,8 +62,14 @@ impl FlyingBoard {
         self.reports.push(report);
     }
 
-    fn show(&mut self, Report { tick, key, wrong, text }: &Report) {
-        self.board.report(*tick, key.clone(), Severity::Error, *wrong, text);
+    fn show(&mut self, Report { tick, key, severity, wrong, text }: &Report) {
+        self.board.report(*tick, key.clone(), *severity, *wrong, text);
+    }
+
+    /// More is known to be reported.
+    pub fn plan(&mut self, reports: Vec<Report>) {
+        self.planned.extend(reports);
+        self.planned.make_contiguous().sort_by_key(|report| report.tick);
     }
 
     /// Time has come to `now`: tells what happened, and answers operators. Returns whether anything happened.

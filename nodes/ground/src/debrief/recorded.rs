@@ -11,6 +11,7 @@ use swath_bags::schema::{Schema, adapt};
 use swath_bags::{Bag, Filter, TopicPattern};
 use swath_msgs::RosMessage;
 use swath_msgs::swath_msgs as msg;
+use swath_node::fault_orders::ordered;
 use swath_node::messages::task_result::task_record;
 use swath_ros::{Cdr, decode, graph};
 use swath_sim::task::SettledTask;
@@ -18,6 +19,7 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
+use swath_mission::faults::orders::Ordered;
 use swath_mission::file::{Mission, MissionRequests};
 use swath_mission::orders::action::{Act, Action};
 use swath_mission::orders::order::Order;
@@ -67,6 +69,8 @@ pub struct Recorded {
     pub decisions: BTreeMap<u64, msg::Decision>,
     /// Changes of strip requests, in order.
     pub events: Vec<msg::StripStatus>,
+    /// Faults that were ordered on the way, which the mission has too.
+    pub fault_orders: Vec<Ordered>,
     /// Whether the recording reaches the mission's end.
     pub complete: bool,
 }
@@ -105,8 +109,10 @@ impl Recorded {
             offers: BTreeMap::new(),
             decisions: BTreeMap::new(),
             events: Vec::new(),
+            fault_orders: Vec::new(),
             complete: false,
         };
+        recorded.read_fault_orders()?;
         recorded.read_points()?;
         recorded.offers = recorded.by_task(&graph::UPCOMING_STRIPS, |offer| offer.task)?;
         recorded.decisions = recorded.by_task(&graph::PLANNER_DECISION, |decision| decision.task)?;
@@ -127,7 +133,7 @@ impl Recorded {
     }
 
     /// Whether the bag has a topic.
-    fn has<M>(&self, topic: &graph::Topic<M>) -> bool {
+    pub fn has<M>(&self, topic: &graph::Topic<M>) -> bool {
         let name = self.name_of(topic);
         self.bag.topics().iter().any(|recorded| recorded.topic.name == name)
     }
@@ -183,6 +189,21 @@ impl Recorded {
             Ok(())
         })?;
         Ok(by_task)
+    }
+
+    /// Faults that were ordered on the way befall the mission when it is flown again. Each message tells of all before.
+    fn read_fault_orders(&mut self) -> Result<()> {
+        let mut orders: Vec<Ordered> = Vec::new();
+        if self.has(&graph::FAULT_ORDERS) {
+            self.for_each(&graph::FAULT_ORDERS, |message| {
+                let new = ordered(&message).into_iter().filter(|order| !orders.contains(order)).collect::<Vec<_>>();
+                orders.extend(new);
+                Ok(())
+            })?;
+        }
+        orders.iter().for_each(|order| _ = self.mission.faults.add(order.fault));
+        self.fault_orders = orders;
+        Ok(())
     }
 
     fn read_points(&mut self) -> Result<()> {

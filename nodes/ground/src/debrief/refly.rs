@@ -16,6 +16,7 @@ use swath_sim::time::Tick;
 use super::recorded::{Recorded, RecordedArgs};
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::fallback::{GuardedPlanner, Policies};
+use swath_mission::file::Mission;
 use swath_mission::in_process::InProcessMission;
 use swath_mission::orders::action::{Act, Action};
 use swath_mission::outcome::TaskLine;
@@ -130,7 +131,10 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Resul
     let planner = GuardedPlanner::new((policies.make)(planner, recorded.mission.seed)?);
     let planner = GatedPlanner { gate, planner };
     let mut planner = Watching { planner, operators: operators.into(), candidates: Vec::new() };
-    let mut flight = InProcessMission::with_actions(&recorded.mission, actions)?;
+    // Over DDS, what cannot be flown here has changed no task.
+    let faults = recorded.mission.faults.clone().within_one_process();
+    let mission = Mission { faults, ..recorded.mission.clone() };
+    let mut flight = InProcessMission::with_actions(&mission, actions)?;
     let mut tasks = Vec::new();
     loop {
         // A task that was given up then is given up now, at the same tick.

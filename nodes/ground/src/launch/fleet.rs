@@ -8,10 +8,11 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use swath_ros::Sign;
+use swath_bags::cli::NO_ROOM;
+use swath_ros::{Sign, graph};
 
 use swath_mission::outcome::NodeProcess;
-use swath_mission::supervision::{Step, SupervisionConfig, Watch};
+use swath_mission::supervision::{Heard, Step, SupervisionConfig, Watch};
 
 /// How long a process may take to end after it was asked to.
 const STOP_TIMEOUT: Duration = Duration::from_secs(20);
@@ -40,7 +41,14 @@ pub struct Event {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Happened {
     /// It gives no sign of life for so long.
-    Silent(Duration),
+    Silent {
+        /// How long.
+        time: Duration,
+        /// Whether that was ordered.
+        by_order: bool,
+    },
+    /// It gives signs of life again, after it was silent.
+    Heard,
     /// It has ended, as told in words, for the so-manieth time of late, and is started again.
     Lost {
         /// How.
@@ -50,6 +58,8 @@ pub enum Happened {
         /// Whether that was ordered.
         by_order: bool,
     },
+    /// It has ended because there is no room on the disk, and is started again.
+    NoRoom,
     /// Another one is there.
     Back {
         /// Whether the loss before was ordered.
@@ -78,6 +88,8 @@ struct Member {
     /// Whether it has been struck since its last sign of life.
     by_order: bool,
     lost: bool,
+    /// Whether it was lost for want of room.
+    no_room: bool,
     /// Whether the mission goes on without it.
     beside: bool,
 }
@@ -124,6 +136,7 @@ impl Fleet {
             struck: 0,
             by_order: false,
             lost: false,
+            no_room: false,
             beside: false,
         }
     }
@@ -164,7 +177,8 @@ impl Fleet {
 
     /// Whether every process that is not given up is there.
     pub fn is_whole(&self) -> bool {
-        self.members.iter().all(|member| member.watch.given_up() || (member.running.is_some() && !member.lost))
+        let there = |member: &Member| member.running.is_some() && !member.lost;
+        self.members.iter().all(|member| member.watch.given_up() || member.no_room || there(member))
     }
 
     /// Simulated time as the nodes know it [ns].
@@ -205,49 +219,9 @@ impl Fleet {
     pub fn supervise(&mut self) -> Result<Vec<Event>> {
         let mut events = Vec::new();
         for member in &mut self.members {
-            let name = member.name.clone();
-            let mut tell = |what| events.push(Event { node: name.clone(), what });
             let now = self.began.elapsed();
-            let back = member.listen(now, &mut self.now_ns);
-            if back && std::mem::take(&mut member.lost) {
-                tell(Happened::Back { by_order: std::mem::take(&mut member.by_order) });
-            }
-            if let Some(status) = member.ended()? {
-                member.hear_out(now, &mut self.now_ns);
-                member.running = None;
-                member.lost = true;
-                let how = ending(&member.name, status);
-                let by_order = member.by_order;
-                // One that ends by itself has said why, and would do so again.
-                let leaves = member.beside && status.signal().is_none();
-                let step = if leaves { member.watch.give_up() } else { member.watch.lost(now) };
-                tracing::warn!("{how}");
-                tell(match step {
-                    Step::GiveUp => Happened::GivenUp { how },
-                    _ => Happened::Lost { how, times: member.watch.losses(), by_order },
-                });
-                continue;
-            }
-            if member.beside && member.running.is_some() {
-                member.watch.sign(now);
-                if std::mem::take(&mut member.lost) {
-                    tell(Happened::Back { by_order: std::mem::take(&mut member.by_order) });
-                }
-            }
-            match member.watch.step(now) {
-                Step::Warn => tell(Happened::Silent(Duration::from_secs_f64(self.config.warn_s))),
-                Step::Kill => {
-                    tracing::warn!("node {} gives no sign of life and is killed", member.name);
-                    member.kill()?;
-                }
-                Step::Start => {
-                    member.epoch += 1;
-                    member.start(&self.config)?;
-                    member.watch.started(now);
-                    tracing::info!("node {} is started again", member.name);
-                }
-                Step::Nothing | Step::GiveUp => {}
-            }
+            let happened = member.supervise(now, &mut self.now_ns, &self.config)?;
+            events.extend(happened.into_iter().map(|what| Event { node: member.name.clone(), what }));
         }
         Ok(events)
     }
@@ -266,9 +240,15 @@ impl Fleet {
         for name in names {
             let Some(at) = self.members.iter().position(|member| member.name == *name) else { continue };
             let member = self.members.swap_remove(at);
-            let Some(mut running) = member.running else { bail!("node {name} was lost and is not there again") };
+            let Some(mut running) = member.running else {
+                if member.no_room {
+                    continue;
+                }
+                bail!("node {name} was lost and is not there again")
+            };
             let status = stop(&mut running.child)?;
-            if !status.success() {
+            let no_room = *name == graph::RECORDER && status.code() == Some(i32::from(NO_ROOM));
+            if !status.success() && !no_room {
                 bail!("{}", ending(name, status));
             }
         }
@@ -306,24 +286,87 @@ impl Member {
         Ok(())
     }
 
+    /// What has become of it since the last call.
+    fn supervise(&mut self, now: Duration, now_ns: &mut u64, config: &SupervisionConfig) -> Result<Vec<Happened>> {
+        let (first, heard) = self.listen(now, now_ns);
+        let mut told: Vec<Happened> = heard.then_some(Happened::Heard).into_iter().collect();
+        if first {
+            told.extend(self.back());
+        }
+        if let Some(status) = self.ended()? {
+            told.push(self.over(status, now, now_ns));
+            return Ok(told);
+        }
+        if self.beside && self.running.is_some() {
+            self.watch.sign(now);
+            told.extend(self.back());
+        }
+        match self.watch.step(now) {
+            Step::Warn => {
+                told.push(Happened::Silent { time: Duration::from_secs_f64(config.warn_s), by_order: self.by_order })
+            }
+            Step::Kill => {
+                tracing::warn!("node {} gives no sign of life and is killed", self.name);
+                self.kill()?;
+            }
+            Step::Start => {
+                self.epoch += 1;
+                self.start(config)?;
+                self.watch.started(now);
+                tracing::info!("node {} is started again", self.name);
+            }
+            Step::Nothing | Step::GiveUp => {}
+        }
+        Ok(told)
+    }
+
+    /// It is there; tells of it when it was lost.
+    fn back(&mut self) -> Option<Happened> {
+        if !std::mem::take(&mut self.lost) {
+            return None;
+        }
+        self.no_room = false;
+        Some(Happened::Back { by_order: std::mem::take(&mut self.by_order) })
+    }
+
+    /// Its process has ended.
+    fn over(&mut self, status: ExitStatus, now: Duration, now_ns: &mut u64) -> Happened {
+        self.hear_out(now, now_ns);
+        self.running = None;
+        self.lost = true;
+        let how = ending(&self.name, status);
+        self.no_room = self.name == graph::RECORDER && status.code() == Some(i32::from(NO_ROOM));
+        if self.no_room {
+            tracing::warn!("{how}: there is no room for the bag");
+            self.watch.wants(now);
+            return Happened::NoRoom;
+        }
+        // One that ends by itself has said why, and would do so again.
+        let leaves = self.beside && status.signal().is_none();
+        let step = if leaves { self.watch.give_up() } else { self.watch.lost(now) };
+        tracing::warn!("{how}");
+        match step {
+            Step::GiveUp => Happened::GivenUp { how },
+            _ => Happened::Lost { how, times: self.watch.losses(), by_order: self.by_order },
+        }
+    }
+
     /// How its process has ended, if it has.
     fn ended(&mut self) -> Result<Option<ExitStatus>> {
         let Some(running) = &mut self.running else { return Ok(None) };
         Ok(running.child.try_wait()?)
     }
 
-    /// Takes in what it has said; returns whether it gives its first sign of life since its start.
-    fn listen(&mut self, now: Duration, now_ns: &mut u64) -> bool {
-        let Some(running) = &self.running else { return false };
+    /// Takes in what it has said; returns whether it gives its first sign of life since its start, and whether one came
+    /// after it was warned of.
+    fn listen(&mut self, now: Duration, now_ns: &mut u64) -> (bool, bool) {
+        let Some(running) = &self.running else { return (false, false) };
         let lines: Vec<String> = running.lines.try_iter().collect();
-        let mut first = false;
-        for line in lines {
-            first |= self.hear(&line, now, now_ns);
-        }
-        first
+        let heard: Vec<Heard> = lines.iter().map(|line| self.hear(line, now, now_ns)).collect();
+        (heard.contains(&Heard::First), heard.contains(&Heard::AfterWarning))
     }
 
-    fn hear(&mut self, line: &str, now: Duration, now_ns: &mut u64) -> bool {
+    fn hear(&mut self, line: &str, now: Duration, now_ns: &mut u64) -> Heard {
         match Sign::parse(line) {
             Some(Sign::Alive(theirs)) => {
                 *now_ns = theirs.max(*now_ns);
@@ -332,9 +375,9 @@ impl Member {
             Some(Sign::Struck(number)) => {
                 self.struck = number + 1;
                 self.by_order = true;
-                false
+                Heard::AsBefore
             }
-            None => false,
+            None => Heard::AsBefore,
         }
     }
 

@@ -1,5 +1,6 @@
 //! The launcher: starts the nodes of a mission, watches them, and leaves its outputs.
 
+mod care;
 mod fleet;
 mod output;
 mod over_dds;

@@ -13,17 +13,19 @@ use swath_node::out;
 use swath_node::stamp::Stamper;
 use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
-use super::fleet::{Event, Fleet, Happened};
+use super::fleet::Fleet;
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use crate::alarms::FlyingBoard;
-use swath_mission::alarms::Key;
 use swath_mission::alarms::conditions::{Report, of_plan};
-use swath_mission::fallback::{Deciders, Policies, fallback, made_instead};
+use swath_mission::alarms::{Key, Severity};
+use swath_mission::fallback::{Deciders, Policies, made_instead};
 use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
+use swath_mission::faults::{FaultPlan, What};
 use swath_mission::file::Mission;
 use swath_mission::link::ground::Ground;
 use swath_mission::link::response::LinkSummary;
@@ -47,8 +49,6 @@ const JOURNAL_DELAY: Duration = Duration::from_millis(500);
 const WAIT: Duration = Duration::from_millis(100);
 /// How long nodes that are started again at the very end may take to be there.
 const WHOLE_TIMEOUT: Duration = Duration::from_secs(20);
-/// After so many losses of late another planner decides in the planner's place.
-const PLANNER_LOSSES: u32 = 3;
 
 /// What there is besides the nodes that fly.
 #[derive(Clone, Copy)]
@@ -76,7 +76,8 @@ pub fn fly(
     let mut fleet = Fleet::new(&mission.supervision);
     let record = wishes.record;
     if record {
-        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, manifest_data)?;
+        let words = [manifest_data, full_bag(&launcher)].concat();
+        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words)?;
     }
     if let Some(address) = wishes.console {
         show(&mut fleet, &mission.name, &namespace, address)?;
@@ -149,11 +150,11 @@ fn start_recorder(
     mission_file: &Path,
     bag: &Path,
     namespace: &str,
-    manifest_data: Vec<String>,
+    further: Vec<String>,
 ) -> Result<()> {
     let (manifest, output) = (text(mission_file)?, text(bag)?);
     let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
-    let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(manifest_data);
+    let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(further);
     let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(namespace)).collect();
     fleet.start(graph::RECORDER, "swath-bag", &words)?;
     fleet.wait_for_line(graph::RECORDER, START_TIMEOUT).map(drop)
@@ -169,6 +170,13 @@ fn manifest_data(mission: &Mission, namespace: &str, policies: &Policies) -> Vec
         Err(error) => entries.push(format!("policy_hash=none: {error}")),
     }
     entries.into_iter().flat_map(|entry| ["--manifest-data".to_owned(), entry]).collect()
+}
+
+/// When nothing can be stored in the bag, by order.
+fn full_bag(launcher: &Launcher) -> Vec<String> {
+    let ns = |tick: Tick| if tick == FOR_GOOD { u64::MAX } else { launcher.stamper.nanoseconds(tick) };
+    let words = |it: &Scheduled| ["--full-disk".to_owned(), format!("{}..{}", ns(it.from), ns(it.until))];
+    launcher.faults.when(What::BagFull, launcher.model.period).iter().flat_map(words).collect()
 }
 
 /// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
@@ -238,42 +246,52 @@ fn report(tick: Tick, status: DiagnosticStatus) -> Option<Report> {
     let (node, name) = status.name.split_once(": ")?;
     let (_, node) = node.rsplit_once('/')?;
     let key = graph::MEMBERS.contains(&node).then(|| Key::new(node, name))?;
-    Some(Report { tick, key, wrong: status.level != DiagnosticStatus::OK, text: status.message })
+    let severity = if status.level == DiagnosticStatus::WARN { Severity::Warn } else { Severity::Error };
+    Some(Report { tick, key, severity, wrong: status.level != DiagnosticStatus::OK, text: status.message })
 }
 
-struct Launcher {
-    node: Node,
-    shutdown: Shutdown,
-    points: Subscription<msg::DecisionPoint>,
-    status: Subscription<msg::GuidanceStatus>,
-    results: Subscription<msg::TaskResult>,
-    summary: Subscription<msg::RequestSummary>,
-    diagnostics: Subscription<DiagnosticArray>,
-    decisions: Subscription<msg::Decision>,
+/// Follows a mission, looks after its nodes, and knows what became of its tasks and alarms.
+pub(super) struct Launcher {
+    pub(super) node: Node,
+    pub(super) shutdown: Shutdown,
+    pub(super) points: Subscription<msg::DecisionPoint>,
+    pub(super) status: Subscription<msg::GuidanceStatus>,
+    pub(super) results: Subscription<msg::TaskResult>,
+    pub(super) summary: Subscription<msg::RequestSummary>,
+    pub(super) diagnostics: Subscription<DiagnosticArray>,
+    pub(super) decisions: Subscription<msg::Decision>,
     /// The last task that was decided on, and who decided on all.
-    decided: Option<u64>,
-    deciders: Deciders,
+    pub(super) decided: Option<u64>,
+    pub(super) deciders: Deciders,
     /// Nothing before the first decision point.
-    flown: Option<Reached>,
-    model: Model,
-    horizon: Tick,
-    log: TaskLog,
-    last_summary: Option<msg::RequestSummary>,
-    paced: bool,
-    stamper: Stamper,
-    alarms: FlyingBoard,
+    pub(super) flown: Option<Reached>,
+    pub(super) model: Model,
+    pub(super) horizon: Tick,
+    pub(super) log: TaskLog,
+    pub(super) last_summary: Option<msg::RequestSummary>,
+    pub(super) paced: bool,
+    pub(super) stamper: Stamper,
+    pub(super) alarms: FlyingBoard,
     /// When something happened to alarms that is not in the journal's file yet.
-    unwritten: Option<Instant>,
-    /// What is ordered to befall the recorder, which knows of no mission.
-    recorder_faults: VecDeque<(Scheduled, Failure)>,
+    pub(super) unwritten: Option<Instant>,
+    /// What is ordered to befall the mission.
+    pub(super) faults: FaultPlan,
+    pub(super) fault_orders: Subscription<msg::FaultOrders>,
+    /// What is ordered to befall the recorder, which knows of no mission, the next first.
+    pub(super) recorder_faults: VecDeque<(Scheduled, Failure)>,
     /// Why the mission is, or ended, in safe mode.
-    safe_mode: Option<String>,
+    pub(super) safe_mode: Option<String>,
+    pub(super) planner_status: Subscription<msg::PlannerStatus>,
+    /// Since when a recorder is there that was lost.
+    pub(super) room_since: Option<Instant>,
+    /// Whether the planner has held since the mission came into safe mode.
+    pub(super) held: bool,
 }
 
 /// How far the mission has come.
 #[derive(Clone, Copy)]
-struct Reached {
-    end: Tick,
+pub(super) struct Reached {
+    pub(super) end: Tick,
     began: Instant,
     last: Instant,
 }
@@ -302,8 +320,13 @@ impl Launcher {
             alarms: FlyingBoard::new(&node, model.period, stamper.clone(), planned)?,
             unwritten: None,
             stamper,
+            faults: mission.faults.clone(),
+            fault_orders: node.subscription(&graph::FAULT_ORDERS)?,
             recorder_faults: mission.faults.of(Process::Recorder, model.period).into(),
             safe_mode: None,
+            planner_status: node.subscription(&graph::PLANNER_STATUS)?,
+            held: false,
+            room_since: None,
             model,
             node,
         })
@@ -389,71 +412,6 @@ impl Launcher {
                 report(tick, status).into_iter().for_each(|report| self.alarms.report(report));
             }
         }
-        Ok(())
-    }
-
-    /// Looks after the processes: before the mission has begun none may be lost, then each is started again.
-    fn mind(&mut self, fleet: &mut Fleet) -> Result<()> {
-        if self.flown.is_none() {
-            fleet.check()?;
-        }
-        for event in fleet.supervise()? {
-            self.note(fleet, event)?;
-        }
-        let now = self.stamper.tick_from(&stamp(fleet.now_ns()));
-        match self.recorder_faults.pop_front_if(|(it, _)| it.from <= now) {
-            Some((_, Failure::Kill)) => fleet.kill(graph::RECORDER),
-            Some((_, Failure::Hang)) => fleet.freeze(graph::RECORDER),
-            None => Ok(()),
-        }
-    }
-
-    /// What has become of a process: tells the alarms, and what comes of it.
-    fn note(&mut self, fleet: &mut Fleet, Event { node, what }: Event) -> Result<()> {
-        let tick = self.stamper.tick_from(&stamp(fleet.now_ns()));
-        let mut tell = |name: &str, wrong: bool, text: &str| {
-            let key = Key::new(graph::LAUNCHER, name);
-            self.alarms.report(Report { tick, key, wrong, text: text.to_owned() });
-        };
-        let lost = format!("{node} lost");
-        match what {
-            Happened::Silent(time) => {
-                tracing::warn!("node {node} gives no sign of life for {} s", time.as_secs_f64());
-            }
-            // The plan tells of what was ordered.
-            Happened::Lost { by_order: true, .. } | Happened::Back { by_order: true } => {}
-            Happened::Lost { how, times, .. } => {
-                tell(&lost, true, &how);
-                if node == graph::PLANNER && times >= PLANNER_LOSSES {
-                    tell("planner replaced", true, &format!("{how}; {} takes over", fallback()));
-                    fleet.set_extra(&node, &[format!("planner:={}", fallback())]);
-                }
-            }
-            Happened::Back { .. } => tell(&lost, false, "it is there again"),
-            Happened::GivenUp { how } => {
-                let reason = format!("{how}, as often before: it is not started again");
-                tell(&lost, true, &reason);
-                return self.give_up(fleet, &node, tick, reason);
-            }
-        }
-        Ok(())
-    }
-
-    /// A node was lost too often: a planner that only holds stands in for the planner, the recorder can be done without,
-    /// and without another one the mission ends.
-    fn give_up(&mut self, fleet: &mut Fleet, node: &str, tick: Tick, reason: String) -> Result<()> {
-        tracing::error!("{reason}");
-        if !graph::ALL_FLIGHT_NODES.contains(&node) {
-            return Ok(());
-        }
-        let key = Key::new(graph::LAUNCHER, "safe mode");
-        self.alarms.report(Report { tick, key, wrong: true, text: reason.clone() });
-        let again = self.safe_mode.replace(reason.clone()).is_some();
-        if node != graph::PLANNER || again {
-            bail!("{reason}");
-        }
-        fleet.set_extra(node, &[format!("planner:={}", fallback()), "mode:=hold".to_owned()]);
-        fleet.pardon(node);
         Ok(())
     }
 

@@ -1,9 +1,10 @@
-//! `swath strips`, `swath planner` and `swath alarms`: an operator's command line to a flying mission.
+//! `swath strips`, `swath planner`, `swath alarms` and `swath fault`: an operator's command line to a flying mission.
 
 mod alarms;
 mod client;
 mod cover;
 mod export;
+mod fault;
 mod files;
 mod link;
 mod orders;
@@ -15,6 +16,7 @@ mod submit;
 mod watch;
 
 pub use alarms::{AlarmsArgs, run as run_alarms};
+pub use fault::{FaultArgs, run as run_fault};
 pub use link::{LinkArgs, run as run_link};
 pub use planner::{PlannerArgs, run as run_planner};
 

@@ -63,7 +63,8 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
             news = true;
         }
         while let Some(status) = planner.take()? {
-            view.planner = Some(status);
+            // With a radio it is on board, and nobody on the ground sees it.
+            view.planner = view.radio.is_none().then_some(status);
             news = true;
         }
         while let Some(status) = radio.take()? {
@@ -71,7 +72,7 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
             if !live && !args.json && turned && !out::print_line(radio_line(&status))? {
                 return Ok(());
             }
-            view.radio = Some(status);
+            (view.radio, view.planner) = (Some(status), None);
             news = true;
         }
         if live && news {

@@ -63,6 +63,45 @@ impl Desk {
 
     /// Takes the calls that have come. Those that ask without changing anything are answered at once.
     pub(super) fn take(&mut self, book: &mut Book, base: &MissionNode, outgoing: &mut Vec<Outgoing>) -> Result<()> {
+        self.take_changes(book, outgoing)?;
+        while let Some((id, call)) = next(&self.get)? {
+            outgoing.push(Outgoing::Get(id, call));
+        }
+        while let Some((id, call)) = next(&self.history)? {
+            outgoing.push(Outgoing::History(id, call));
+        }
+        self.answer_questions(book, base)
+    }
+
+    /// As [`Self::take`], while there is no room for what would be promised: changes are refused.
+    pub(super) fn refuse(&mut self, book: &Book, base: &MissionNode, store: &Store) -> Result<()> {
+        let (reason_code, reason) = (Refusal::StoreFull.code(), Refusal::StoreFull.to_string());
+        while let Some((id, _)) = next(&self.submit)? {
+            let answer = msg::SubmitStripsResponse { reason_code, reason: reason.clone(), ..Default::default() };
+            self.submit.respond(id, answer)?;
+        }
+        while let Some((id, _)) = next(&self.cancel)? {
+            let answer = msg::CancelStripsResponse { reason_code, reason: reason.clone(), ..Default::default() };
+            self.cancel.respond(id, answer)?;
+        }
+        while let Some((id, _)) = next(&self.replace)? {
+            let result = messages::submit_result(book.logic(), true, Err(Refusal::StoreFull));
+            self.replace.respond(id, msg::ReplaceStripResponse { result })?;
+        }
+        while let Some((id, _)) = next(&self.review)? {
+            let answer = msg::ReviewStripsResponse { reason_code, reason: reason.clone(), ..Default::default() };
+            self.review.respond(id, answer)?;
+        }
+        while let Some((id, call)) = next(&self.get)? {
+            self.answer(Outgoing::Get(id, call), book.logic(), base, store)?;
+        }
+        while let Some((id, call)) = next(&self.history)? {
+            self.answer(Outgoing::History(id, call), book.logic(), base, store)?;
+        }
+        self.answer_questions(book, base)
+    }
+
+    fn take_changes(&mut self, book: &mut Book, outgoing: &mut Vec<Outgoing>) -> Result<()> {
         while let Some((id, call)) = next(&self.submit)? {
             match check_batch(call.requests.len()) {
                 Ok(()) => {
@@ -103,12 +142,11 @@ impl Desk {
             let (results, reason_code, reason) = each(&call.ids, decide);
             outgoing.push(Outgoing::Reviewed(id, msg::ReviewStripsResponse { results, reason_code, reason }));
         }
-        while let Some((id, call)) = next(&self.get)? {
-            outgoing.push(Outgoing::Get(id, call));
-        }
-        while let Some((id, call)) = next(&self.history)? {
-            outgoing.push(Outgoing::History(id, call));
-        }
+        Ok(())
+    }
+
+    /// Answers those who only ask.
+    fn answer_questions(&mut self, book: &Book, base: &MissionNode) -> Result<()> {
         while let Some((id, call)) = next(&self.list)? {
             self.list.respond(id, list(book.logic(), base, &call))?;
         }

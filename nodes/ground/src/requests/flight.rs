@@ -53,26 +53,35 @@ impl FlightSide {
         self.last.is_some()
     }
 
-    /// Takes what guidance and planner say.
-    pub(super) fn take(
+    /// The next question of guidance.
+    pub(super) fn next(&mut self) -> Result<Option<msg::DecisionPoint>> {
+        Ok(self.points.take()?)
+    }
+
+    /// Answers a question of guidance.
+    pub(super) fn answer(
         &mut self,
+        point: &msg::DecisionPoint,
         logic: &mut RequestLogic,
         base: &MissionNode,
         store: &Store,
         outgoing: &mut Vec<Outgoing>,
     ) -> Result<()> {
-        while let Some(point) = self.points.take()? {
-            if base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
-                let _ = self.results.flush(FLUSH_TIMEOUT);
-                base.strike();
-            }
-            let offer = self.offer(logic, base, store, &point)?;
-            outgoing.extend(self.results(logic, &point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
-            outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
-            if point.mission_over {
-                outgoing.push(Outgoing::Summary);
-            }
+        if base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
+            let _ = self.results.flush(FLUSH_TIMEOUT);
+            base.strike();
         }
+        let offer = self.offer(logic, base, store, point)?;
+        outgoing.extend(self.results(logic, point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
+        outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
+        if point.mission_over {
+            outgoing.push(Outgoing::Summary);
+        }
+        Ok(())
+    }
+
+    /// Takes what the planner has chosen, and how far guidance is with it.
+    pub(super) fn take_tasks(&self, logic: &mut RequestLogic, base: &MissionNode) -> Result<()> {
         while let Some(task) = self.tasks.take()? {
             if let Some(flown) = messages::in_flight(&task) {
                 logic.on_task(flown);

@@ -31,6 +31,11 @@ pub(super) enum Outgoing {
 }
 
 impl Outgoing {
+    /// Whether the satellite waits for it, and nobody else takes it for a promise.
+    pub(super) fn is_of_flight(&self) -> bool {
+        matches!(self, Self::Offer(_) | Self::Result(_) | Self::Radio(_) | Self::Summary)
+    }
+
     /// Answers promise more than the mission's own bookkeeping.
     pub(super) fn durability(&self) -> Durability {
         match self {

@@ -52,8 +52,9 @@ impl RadioSide {
         self.begun
     }
 
-    /// The next tick of the radio that is news, once its frames are heard; what is sent follows.
-    pub(super) fn take(&mut self, end: &mut GroundEnd, base: &MissionNode) -> Result<Option<(Tick, bool)>> {
+    /// The next tick of the radio that is news, once its frames are heard, unless the ground is deaf; what is sent
+    /// follows.
+    pub(super) fn take(&mut self, end: &mut GroundEnd, base: &MissionNode, deaf: bool) -> Result<Option<(Tick, bool)>> {
         while let Some(clock) = self.clock.take()? {
             end.at(base.stamper.tick_from(&clock.clock));
         }
@@ -70,7 +71,7 @@ impl RadioSide {
                 }
             };
             base.set_now(tick);
-            let frames = turn.frames.iter().map(|frame| frame.data.to_vec()).collect();
+            let frames = turn.frames.iter().filter(|_| !deaf).map(|frame| frame.data.to_vec()).collect();
             if end.hear(tick, Tick(turn.next), frames) {
                 self.open = turn.open;
                 return Ok(Some((tick, turn.open)));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rusqlite::backup::Backup;
-use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row, TransactionBehavior};
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension as _, Row, TransactionBehavior};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
@@ -66,6 +66,14 @@ pub enum StoreError {
         /// What is wrong.
         what: &'static str,
     },
+}
+
+impl StoreError {
+    /// Whether there is no room where the file is.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        matches!(self, Self::Sqlite { source, .. } if source.sqlite_error_code() == Some(ErrorCode::DiskFull))
+    }
 }
 
 /// Steps from each schema to the next; the first makes an empty file schema 1.
@@ -213,6 +221,18 @@ impl Store {
 
     fn error(&self, source: rusqlite::Error) -> StoreError {
         StoreError::Sqlite { path: self.path.clone(), source }
+    }
+
+    /// How many pages the file may have.
+    #[cfg(test)]
+    pub(super) fn set_pages_max(&self, pages: u32) -> Result<(), StoreError> {
+        self.connection.pragma_update(None, "max_page_count", pages).map_err(|source| self.error(source))
+    }
+
+    /// What SQLite says where there is no room.
+    pub(super) fn full(&self) -> StoreError {
+        let full = rusqlite::ffi::Error::new(rusqlite::ffi::SQLITE_FULL);
+        self.error(rusqlite::Error::SqliteFailure(full, Some("no room, by order".to_owned())))
     }
 
     fn setting(&self, key: &str) -> Result<Option<String>, StoreError> {

@@ -202,3 +202,24 @@ fn whoever_opened_a_store_before_cannot_write_it_any_more() {
     fresh.write(entries.iter(), &progress, Durability::Machine).unwrap();
     assert_eq!(fresh.snapshot().unwrap().requests.len(), known + 1);
 }
+
+/// What SQLite says when its file may not grow is what it says when the disk is full.
+#[test]
+fn a_store_without_room_says_so_and_goes_on_once_there_is_some() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(&folder.path().join("store.sqlite"), "mission").unwrap();
+    let mut logic = empty();
+    store.set_pages_max(1).unwrap();
+    for order in requests(300) {
+        let _ = logic.submit(order, logic.now());
+    }
+    let (journal, progress) = (logic.take_journal(), logic.progress());
+    let error = store.write(journal.iter(), &progress, Durability::Machine).unwrap_err();
+    assert!(error.is_full() && store.full().is_full(), "{error}");
+    assert!(!store.snapshot().unwrap().begun, "nothing of it is there");
+    store.set_pages_max(1_000_000).unwrap();
+    store.write(journal.iter(), &progress, Durability::Machine).unwrap();
+    assert_eq!(store.snapshot().unwrap().requests.len(), logic.len());
+    let other = StoreError::TakenOver { path: folder.path().to_owned() };
+    assert!(!other.is_full());
+}

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
@@ -21,10 +22,14 @@ use super::outgoing::Outgoing;
 use super::radio::{self, RadioSide};
 use super::store::{Durability, Store};
 use super::writer::Writer;
+use swath_mission::alarms::conditions::{Report, STORE_FULL};
+use swath_mission::faults::What;
+use swath_mission::faults::plan::Scheduled;
 use swath_mission::orders::action::Act;
 use swath_mission::orders::order::Order;
 use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::logic::RequestLogic;
+use swath_mission::requests::refusal::Refusal;
 use swath_node::node::{MissionNode, Severity};
 use swath_node::orders::{operator_action, order_of};
 use swath_node::program::{Parameter, Program};
@@ -74,6 +79,12 @@ struct RequestNode {
     unheard: Vec<Arc<Vec<Entry>>>,
     written: Progress,
     writer: Writer,
+    /// Whether there was no room, as it was told last.
+    full_told: bool,
+    /// When there is no room, by order, and the time; where nothing is ordered, neither.
+    full_by_order: Vec<Scheduled>,
+    clock: Option<Subscription<Clock>>,
+    clock_at: Tick,
     reader: Store,
     base: MissionNode,
     /// Nobody else writes the store.
@@ -120,7 +131,7 @@ impl RequestNode {
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let book = take_up(&base, &mut store)?;
-        Ok(Self {
+        let mut node = Self {
             desk: Desk::new(&base.node)?,
             side: Side::new(&base)?,
             requests: base.node.subscription(&graph::STRIP_REQUEST)?,
@@ -131,12 +142,31 @@ impl RequestNode {
             unheard: Vec::new(),
             written: book.logic().progress(),
             writer: Writer::start(store, base.node.signal().clone()),
+            full_told: false,
+            full_by_order: Vec::new(),
+            clock: None,
+            clock_at: Tick(0),
             reader,
             book,
             base,
             _lock: lock,
             _temporary: temporary,
-        })
+        };
+        node.mind_faults()?;
+        Ok(node)
+    }
+
+    fn take_fault_orders(&mut self) -> Result<()> {
+        if self.base.take_fault_orders()? { self.mind_faults() } else { Ok(()) }
+    }
+
+    /// What follows from the faults by order, those that were ordered on the way too.
+    fn mind_faults(&mut self) -> Result<()> {
+        self.full_by_order = self.base.mission.faults.when(What::StoreFull, self.base.model.period);
+        if !self.full_by_order.is_empty() && self.clock.is_none() {
+            self.clock = Some(self.base.node.subscription(&graph::CLOCK)?);
+        }
+        Ok(())
     }
 
     fn fly(&mut self) -> Result<()> {
@@ -146,20 +176,37 @@ impl RequestNode {
         Ok(())
     }
 
+    /// What is on the other side of it: questions of guidance and what is answered, or the next tick of the radio.
+    fn take_side(&mut self, outgoing: &mut Vec<Outgoing>) -> Result<Option<(Tick, bool)>> {
+        self.take_fault_orders()?;
+        loop {
+            let point = match (&mut self.side, &mut self.book) {
+                (Side::Flight(side), Book::Whole(_)) => side.next()?,
+                // Without room the ground is deaf and mute: what it does not hear is sent again.
+                (Side::Radio(side), Book::Ground(end)) => return side.take(end, &self.base, self.writer.full()),
+                // Both follow from the mission.
+                _ => None,
+            };
+            let Some(point) = point else { break };
+            self.take_fault_orders()?;
+            self.mind_room(Tick(point.tick))?;
+            if let (Side::Flight(side), Book::Whole(logic)) = (&mut self.side, &mut self.book) {
+                side.answer(&point, logic, &self.base, &self.reader, outgoing)?;
+            }
+        }
+        if let (Side::Flight(side), Book::Whole(logic)) = (&self.side, &mut self.book) {
+            side.take_tasks(logic, &self.base)?;
+        }
+        Ok(None)
+    }
+
     fn turn(&mut self) -> Result<()> {
         let mut outgoing = Vec::new();
-        let sends = match (&mut self.side, &mut self.book) {
-            (Side::Flight(side), Book::Whole(logic)) => {
-                side.take(logic, &self.base, &self.reader, &mut outgoing)?;
-                None
-            }
-            (Side::Radio(side), Book::Ground(end)) => side.take(end, &self.base)?,
-            // Both follow from the mission.
-            _ => None,
-        };
+        let sends = self.take_side(&mut outgoing)?;
+        self.mind_room(Tick(0))?;
         self.take_what_is_asked(&mut outgoing)?;
         if let (Some((tick, open)), Book::Ground(end)) = (sends, &mut self.book) {
-            let sent = end.send(tick, open);
+            let sent = end.send(tick, open && !self.writer.full());
             outgoing.push(Outgoing::Radio(Box::new(radio::message(&self.base, tick, sent))));
             outgoing.extend((tick >= self.base.horizon).then_some(Outgoing::Summary));
         }
@@ -184,11 +231,17 @@ impl RequestNode {
             return Ok(());
         }
         while let Some(request) = self.requests.take()? {
-            if let Err(refusal) = self.book.submit(order_of(&request)) {
+            if self.writer.full() {
+                self.base.alarm(Severity::Warn, "request refused", &Refusal::StoreFull.to_string())?;
+            } else if let Err(refusal) = self.book.submit(order_of(&request)) {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
-        self.desk.take(&mut self.book, &self.base, outgoing)?;
+        if self.writer.full() {
+            self.desk.refuse(&self.book, &self.base, &self.reader)?;
+        } else {
+            self.desk.take(&mut self.book, &self.base, outgoing)?;
+        }
         self.desk.work(&mut self.book, SLICE, outgoing);
         Ok(())
     }
@@ -212,7 +265,18 @@ impl RequestNode {
     /// Sends what is written.
     fn release(&mut self) -> Result<()> {
         let written = self.writer.written();
+        let mut ready: Vec<Outgoing> = Vec::new();
         while let Some((_, outgoing)) = self.outbox.pop_front_if(|(number, _)| *number <= written) {
+            ready.push(outgoing);
+        }
+        if self.writer.full() {
+            // The satellite does not wait for room: it flies on with what nobody but it was promised.
+            let (flies, waits) = self.outbox.drain(..).partition(|(_, outgoing)| outgoing.is_of_flight());
+            self.outbox = waits;
+            let flies: VecDeque<_> = flies;
+            ready.extend(flies.into_iter().map(|(_, outgoing)| outgoing));
+        }
+        for outgoing in ready {
             match outgoing {
                 Outgoing::Offer(offer) => {
                     if let Side::Flight(side) = &self.side {
@@ -241,6 +305,24 @@ impl RequestNode {
                 }
                 answer => self.desk.answer(answer, self.book.logic(), &self.base, &self.reader)?,
             }
+        }
+        Ok(())
+    }
+
+    /// Whether there is room to write: by order, and as it is. What is ordered is told of by the plan.
+    fn mind_room(&mut self, tick: Tick) -> Result<()> {
+        while let Some(clock) = self.clock.as_ref().map_or(Ok(None), Subscription::take)? {
+            self.clock_at = self.clock_at.max(self.base.stamper.tick_from(&clock.clock));
+        }
+        let now = self.clock_at.max(tick);
+        let ordered = self.full_by_order.iter().any(|it| it.from <= now && now < it.until);
+        self.writer.set_full_by_order(ordered);
+        let full = self.writer.full();
+        if full != self.full_told && !(full && ordered) {
+            self.full_told = full;
+            let text = if full { Refusal::StoreFull.to_string() } else { "there is room".to_owned() };
+            let at = self.book.logic().now().max(self.clock_at);
+            self.base.condition(&Report::new(at, graph::REQUEST_MANAGER, STORE_FULL, full, text))?;
         }
         Ok(())
     }

@@ -176,7 +176,9 @@ impl Board {
             severity,
             text: String::new(),
         });
-        known.severity = severity;
+        if wrong {
+            known.severity = severity;
+        }
         text.clone_into(&mut known.text);
         let actor = key.node.clone();
         // Only operators' wishes are refused.

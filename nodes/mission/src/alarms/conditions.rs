@@ -18,6 +18,13 @@ const CATALOGUE: &str = "catalogue";
 /// Who tells of lost nodes.
 const LAUNCHER: &str = "launcher";
 
+/// The alarm of messages that are dropped.
+const MESSAGES_DROPPED: &str = "messages dropped";
+/// The alarm of a store that cannot be written.
+pub const STORE_FULL: &str = "store full";
+/// The alarm of a bag that cannot be written.
+pub const BAG_FULL: &str = "bag full";
+
 /// A node says whether something is wrong.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
@@ -25,6 +32,8 @@ pub struct Report {
     pub tick: Tick,
     /// Which alarm.
     pub key: Key,
+    /// How grave it is, where the table does not say.
+    pub severity: Severity,
     /// Whether something is wrong.
     pub wrong: bool,
     /// What.
@@ -32,8 +41,10 @@ pub struct Report {
 }
 
 impl Report {
-    fn new(tick: Tick, node: &str, name: &str, wrong: bool, text: String) -> Self {
-        Self { tick, key: Key::new(node, name), wrong, text }
+    /// What a node reports of an alarm of the table.
+    #[must_use]
+    pub fn new(tick: Tick, node: &str, name: &str, wrong: bool, text: String) -> Self {
+        Self { tick, key: Key::new(node, name), severity: Severity::Error, wrong, text }
     }
 }
 
@@ -44,11 +55,11 @@ pub fn report_all(board: &mut Board, mut reports: Vec<Report>, wishes: &[Wish]) 
     let mut wishes = wishes.iter().peekable();
     // A wish was followed when it came; what it met may have come in another order then.
     let follow = |wish: &Wish, board: &mut Board| _ = wish.follow(board);
-    for Report { tick, key, wrong, text } in reports {
+    for Report { tick, key, severity, wrong, text } in reports {
         while let Some(wish) = wishes.next_if(|wish| wish.tick < tick) {
             follow(wish, board);
         }
-        board.report(tick, key, Severity::Error, wrong, &text);
+        board.report(tick, key, severity, wrong, &text);
     }
     wishes.for_each(|wish| follow(wish, board));
 }
@@ -108,7 +119,13 @@ pub fn back(lost: &Scheduled) -> Tick {
 }
 
 fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
-    let What::Process(process, failure) = it.what else { return None };
-    let text = if failure == Failure::Kill { "killed by order" } else { "hangs by order" };
-    Some((LAUNCHER, format!("{} lost", process.name()), text.to_owned()))
+    let alarm = |name: String, text: &str| Some((LAUNCHER, name, text.to_owned()));
+    match it.what {
+        What::Process(process, Failure::Kill) => alarm(format!("{} lost", process.name()), "killed by order"),
+        What::Process(process, Failure::Hang) => alarm(format!("{} lost", process.name()), "hangs by order"),
+        What::Drop(_) => alarm(MESSAGES_DROPPED.to_owned(), &format!("{} by order", it.what)),
+        What::StoreFull => alarm(STORE_FULL.to_owned(), "full by order"),
+        What::BagFull => alarm(BAG_FULL.to_owned(), "full by order"),
+        What::Vehicle(_) => None,
+    }
 }

@@ -76,6 +76,17 @@ const NODE_LOST: Definition = lasting(
     ],
 );
 
+/// A node is there and says nothing; the launcher tells of each by `NODE silent`.
+const NODE_SILENT: Definition = lasting(
+    "silent",
+    Severity::Warn,
+    [
+        "the main loop of the node has given no sign of life for `supervision.warn_s`",
+        "what the node does waits; after `supervision.kill_s` it is killed and started again",
+        "nothing, if it returns; else look at what its machine is doing",
+    ],
+);
+
 /// Every alarm that has a name of its own.
 pub const DEFINITIONS: &[Definition] = &[
     lasting("wheel x", Severity::Error, WHEEL),
@@ -126,6 +137,33 @@ pub const DEFINITIONS: &[Definition] = &[
             "look at the next passes (`swath passes`) and at the stations",
         ],
     ),
+    lasting(
+        "messages dropped",
+        Severity::Warn,
+        [
+            "messages between nodes are lost, by order",
+            "what is not answered is asked again; ticks of a paced mission may pass without a torque command",
+            "nothing, if it returns; plan no drill for the time of an important pass",
+        ],
+    ),
+    lasting(
+        "store full",
+        Severity::Error,
+        [
+            "there is no room where the requests are kept",
+            "no request is taken, changed or answered; what was acknowledged is kept, and the satellite flies on",
+            "make room: what waits is written as soon as there is some",
+        ],
+    ),
+    lasting(
+        "bag full",
+        Severity::Error,
+        [
+            "there is no room where the bag is written",
+            "nothing is recorded; the bag is whole up to there, and goes on in a new file once there is room",
+            "make room",
+        ],
+    ),
     moment(
         "planner late",
         Severity::Warn,
@@ -146,8 +184,12 @@ const WHEEL: [&str; 3] = [
 /// What holds for an alarm by name. `None` for one without a definition of its own, which tells of a moment.
 #[must_use]
 pub fn definition(name: &str) -> Option<&'static Definition> {
-    let lost = || name.ends_with(" lost").then_some(&NODE_LOST);
-    DEFINITIONS.iter().find(|definition| definition.name == name).or_else(lost)
+    let of_node = || match name.rsplit_once(' ') {
+        Some((_, "lost")) => Some(&NODE_LOST),
+        Some((_, "silent")) => Some(&NODE_SILENT),
+        _ => None,
+    };
+    DEFINITIONS.iter().find(|definition| definition.name == name).or_else(of_node)
 }
 
 /// When the condition of an alarm counts.
@@ -163,8 +205,9 @@ pub fn rules(name: &str, period: TickPeriod) -> Rules {
 pub fn table() -> String {
     let mut text =
         String::from("| alarm | severity | cause | effect | what to do |\n| --- | --- | --- | --- | --- |\n");
-    let node_lost = Definition { name: "*NODE* lost", ..NODE_LOST };
-    for it in DEFINITIONS.iter().chain([&node_lost]) {
+    let of_nodes =
+        [Definition { name: "*NODE* lost", ..NODE_LOST }, Definition { name: "*NODE* silent", ..NODE_SILENT }];
+    for it in DEFINITIONS.iter().chain(&of_nodes) {
         let severity = it.severity.name();
         text += &format!("| {} | {severity} | {} | {} | {} |\n", it.name, it.cause, it.effect, it.response);
     }
@@ -187,6 +230,8 @@ mod tests {
             assert_eq!(super::definition(definition.name), Some(definition));
         }
         assert_eq!(definition("guidance lost").map(|it| it.severity), Some(Severity::Error));
+        assert_eq!(definition("guidance silent").map(|it| it.severity), Some(Severity::Warn));
+        assert_eq!(definition("ground silent").map(|it| it.severity), Some(Severity::Error));
         assert_eq!(definition("task refused"), None);
     }
 }

@@ -4,6 +4,7 @@
 //! `wheel2:weak 50%@600s`, `gyro:bias 0.01deg/s@700s`, `startracker:out@800s+30s`, `store:full`, `bag:full`.
 
 pub mod grammar;
+pub mod orders;
 pub mod plan;
 pub mod random;
 

@@ -24,6 +24,9 @@ fn is_zero(number: &u32) -> bool {
     *number == 0
 }
 
+/// Greatest share of messages that is dropped: what comes again until it is answered must come some time.
+const DROP_MAX: f64 = 0.5;
+
 /// Most faults of a mission.
 pub const FAULTS_MAX: usize = 1000;
 
@@ -66,12 +69,18 @@ pub enum FaultPlanError {
         /// How long it was to be [s].
         for_s: f64,
     },
+    /// Too little would come through.
+    #[error("{fault}: in lockstep time stands until a message comes through; drop at most 50%")]
+    NothingLeft {
+        /// The fault.
+        fault: PlannedFault,
+    },
     /// It cannot be made to happen where the mission is flown.
-    #[error("{fault} cannot be flown {place}: {can}")]
+    #[error("{fault} cannot be {place}: {can}")]
     NotHere {
         /// The fault.
         fault: PlannedFault,
-        /// Where the mission is flown.
+        /// What it cannot be, and where.
         place: &'static str,
         /// What can fail there.
         can: &'static str,
@@ -132,7 +141,7 @@ impl FaultPlan {
     pub fn resolved(mut self, seed: u64, horizon: Tick, period: TickPeriod) -> Self {
         for fault in random::draw(seed, std::mem::take(&mut self.random), horizon, period) {
             self.plan.push(fault);
-            if check(&self.plan, Tick(0), horizon, period).is_err() {
+            if check(&self.plan, horizon, period).is_err() {
                 self.plan.pop();
             }
         }
@@ -144,21 +153,24 @@ impl FaultPlan {
     /// # Errors
     /// The first fault that cannot be flown.
     pub fn validate(&self, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
-        check(&self.plan, Tick(0), horizon, period)
+        check(&self.plan, horizon, period)
     }
 
-    /// Checks that a mission in one process can fly the faults: there are no messages, stores and bags in it.
+    /// Checks that a mission in one process can fly the faults: there is no spacecraft and no recorder to be lost in it.
+    /// Of messages that are dropped, a full store and a full bag it has the alarms: over DDS they change no task either.
     ///
     /// # Errors
     /// The first that it cannot.
     pub fn fits_one_process(&self) -> Result<(), FaultPlanError> {
-        let flown = |fault: &PlannedFault| match fault.what {
-            What::Vehicle(_) => true,
-            What::Process(process, _) => Process::IN_PROCESS.contains(&process),
-            What::Drop(_) | What::StoreFull | What::BagFull => false,
-        };
-        let can = "wheels, gyro, star tracker, guidance, planner and request_manager can fail there";
-        self.each(flown, "in one process", can)
+        let can = "everything but spacecraft and recorder can fail there";
+        self.each(in_one_process, "flown in one process", can)
+    }
+
+    /// Without the faults that no mission in one process can fly; over DDS they change no task.
+    #[must_use]
+    pub fn within_one_process(mut self) -> Self {
+        self.plan.retain(in_one_process);
+        self
     }
 
     /// Checks that a mission over DDS can fly the faults.
@@ -167,15 +179,22 @@ impl FaultPlan {
     /// The first that it cannot.
     pub fn fits_dds(&self) -> Result<(), FaultPlanError> {
         let flown = |fault: &PlannedFault| match fault.what {
-            What::Vehicle(_) => true,
             // What would have been offered and recorded meanwhile, nobody knows.
             What::Process(Process::RequestManager | Process::Recorder, _) => fault.for_s.is_none(),
-            What::Process(..) => true,
-            What::Drop(_) | What::StoreFull | What::BagFull => false,
+            _ => true,
         };
-        let can =
-            "wheels, gyro, star tracker and nodes can fail there; request_manager and recorder are replaced at once";
-        self.each(flown, "over DDS", can)
+        let can = "everything can fail there; request_manager and recorder are replaced at once";
+        self.each(flown, "flown over DDS", can)
+    }
+
+    /// Checks that the faults can be ordered while a mission flies over DDS.
+    ///
+    /// # Errors
+    /// The first that cannot.
+    pub fn fits_orders(&self) -> Result<(), FaultPlanError> {
+        self.fits_dds()?;
+        let can = "everything else can be; the recorder knows of nothing but the mission file";
+        self.each(|fault| fault.what != What::BagFull, "ordered while a mission flies", can)
     }
 
     fn each(
@@ -207,7 +226,7 @@ impl FaultPlan {
         }
         fault.at_s = fault.at_s.or(Some(now_s));
         self.plan.push(fault);
-        if let Err(error) = check(&self.plan, now, horizon, period) {
+        if let Err(error) = check(&self.plan, horizon, period) {
             self.plan.pop();
             return Err(error);
         }
@@ -232,6 +251,22 @@ impl FaultPlan {
         self.scheduled(period).into_iter().filter_map(of).collect()
     }
 
+    /// When messages are dropped, and which share of them.
+    #[must_use]
+    pub fn drops(&self, period: TickPeriod) -> Vec<(Scheduled, f64)> {
+        let of = |it: Scheduled| match it.what {
+            What::Drop(share) => Some((it, share)),
+            _ => None,
+        };
+        self.scheduled(period).into_iter().filter_map(of).collect()
+    }
+
+    /// When this happens: the store, or the bag, is full.
+    #[must_use]
+    pub fn when(&self, what: What, period: TickPeriod) -> Vec<Scheduled> {
+        self.scheduled(period).into_iter().filter(|it| it.what == what).collect()
+    }
+
     /// The faults of a node.
     #[must_use]
     pub fn of(&self, process: Process, period: TickPeriod) -> Vec<(Scheduled, Failure)> {
@@ -243,17 +278,30 @@ impl FaultPlan {
     }
 }
 
-fn check(plan: &[PlannedFault], now: Tick, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
+/// Whether a mission in one process can fly a fault.
+fn in_one_process(fault: &PlannedFault) -> bool {
+    match fault.what {
+        What::Process(process, _) => Process::IN_PROCESS.contains(&process),
+        _ => true,
+    }
+}
+
+fn check(plan: &[PlannedFault], horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
     if plan.len() > FAULTS_MAX {
         return Err(FaultPlanError::TooMany { count: plan.len() });
     }
-    let scheduled: Vec<_> = plan.iter().map(|fault| Scheduled::new(fault, now, period)).collect();
+    let scheduled: Vec<_> = plan.iter().map(|fault| Scheduled::new(fault, Tick(0), period)).collect();
     for (i, (&fault, it)) in plan.iter().zip(&scheduled).enumerate() {
         if let (What::Process(Process::Spacecraft, _), Some(for_s)) = (fault.what, fault.for_s) {
             return Err(FaultPlanError::OwnsTheClock { fault, for_s });
         }
         if it.from >= horizon {
             return Err(FaultPlanError::AfterEnd { fault, end_s: period.time_s(horizon) });
+        }
+        if let What::Drop(share) = fault.what
+            && share > DROP_MAX
+        {
+            return Err(FaultPlanError::NothingLeft { fault });
         }
         for (&second, other) in plan.iter().zip(&scheduled).skip(i + 1) {
             let part = fault.what.part();
@@ -288,6 +336,11 @@ mod tests {
             (&["guidance:kill@5s", "guidance:hang@5s"], "both change guidance"),
             (&["planner:kill@1000s"], "planner:kill@1000s comes too late: the mission ends at 1000 s"),
             (&["spacecraft:kill@10s+5s"], "the spacecraft owns the clock"),
+            (
+                &["topic:drop 51%@10s+5s"],
+                "topic:drop 51%@10s+5s: in lockstep time stands until a message comes through",
+            ),
+            (&["topic:drop 5%@10s+9s", "topic:drop 6%@12s"], "both change topic at the same time"),
         ] {
             let error = plan(texts).validate(HORIZON, period()).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
@@ -314,11 +367,16 @@ mod tests {
         assert_eq!(refused(&["wheel1:dead@5s", "guidance:kill@5s", "request_manager:hang@5s+9s"], false), Ok(()));
         assert_eq!(refused(&["wheel1:dead@5s", "startracker:out@5s"], true), Ok(()));
         assert_eq!(refused(&["guidance:kill@5s+9s", "request_manager:hang@5s", "spacecraft:kill@9s"], true), Ok(()));
-        for (text, dds) in [("store:full", false), ("topic:drop 5%@1s", false), ("spacecraft:kill@5s", false)] {
-            let error = refused(&[text], dds).unwrap_err();
-            assert!(error.starts_with(&format!("{text} cannot be flown in one process: wheels, gyro")), "{error}");
+        for dds in [false, true] {
+            assert_eq!(refused(&["store:full", "topic:drop 5%@1s", "bag:full@3s+5s"], dds), Ok(()));
         }
-        for text in ["request_manager:kill@9s+5s", "recorder:hang@9s+5s", "store:full@9s", "topic:drop 20%@9s"] {
+        for text in ["recorder:kill@5s", "spacecraft:kill@5s"] {
+            let error = refused(&[text], false).unwrap_err();
+            assert!(error.starts_with(&format!("{text} cannot be flown in one process: everything but")), "{error}");
+        }
+        let error = plan(&["bag:full@9s"]).fits_orders().unwrap_err().to_string();
+        assert!(error.starts_with("bag:full@9s cannot be ordered while a mission flies"), "{error}");
+        for text in ["request_manager:kill@9s+5s", "recorder:hang@9s+5s"] {
             let error = refused(&["gyro:bias 0.1deg/s@5s", text], true).unwrap_err();
             assert!(error.starts_with(&format!("{text} cannot be flown over DDS")), "{error}");
         }

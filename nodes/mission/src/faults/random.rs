@@ -36,13 +36,17 @@ fn what(rng: &mut Rng) -> What {
     let process = Process::IN_PROCESS[rng.random_range(0..Process::IN_PROCESS.len())];
     let wheel = rng.random_range(0..3);
     let percent = f64::from(rng.random_range(5..=95u32)) / 100.0;
-    match rng.random_range(0..10u32) {
+    let dropped = f64::from(rng.random_range(5..=30u32)) / 100.0;
+    match rng.random_range(0..13u32) {
         0..3 => What::Process(process, Failure::Kill),
         3..5 => What::Process(process, Failure::Hang),
         5 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Dead)),
         6 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Stuck)),
         7 => What::Vehicle(Fault::Wheel(wheel, WheelFault::Weak(percent))),
-        8 => What::Vehicle(Fault::GyroBias((f64::from(rng.random_range(5..=100u32)) / 1000.0).to_radians())),
+        8 => What::Drop(dropped),
+        9 => What::StoreFull,
+        10 => What::BagFull,
+        11 => What::Vehicle(Fault::GyroBias((f64::from(rng.random_range(5..=100u32)) / 1000.0).to_radians())),
         _ => What::Vehicle(Fault::StarTrackerOut),
     }
 }

@@ -5,6 +5,7 @@ use swath_sim::requests::catalogue::{Prepared, Validity};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::{StripId, StripRequest};
 
+use super::duplicates::may_be_asked_again;
 use super::journal::{Added, Change, Entry, Standing};
 use super::lifecycle::State;
 use super::logic::RequestLogic;
@@ -148,24 +149,6 @@ impl RequestLogic {
         self.catalogue.insert(prepared);
     }
 
-    fn check_same_strip(&self, order: &Order, replaces: Option<StripId>) -> Result<(), Refusal> {
-        let twin = replaces.and_then(|old| self.catalogue.get(old)?.linked);
-        let (ours_from, ours_until) = order.validity_ns();
-        let same = self.register.at_place(&order.request).find(|(id, known)| {
-            let (from, until) = known.order.validity_ns();
-            Some(*id) != replaces
-                && Some(*id) != twin
-                && known.order.submitter == order.submitter
-                && known.order.request.acquisition_speed_m_s == order.request.acquisition_speed_m_s
-                && ours_from < until
-                && from < ours_until
-        });
-        match same {
-            Some((id, known)) => Err(Refusal::SameStrip { id: id.0, state: known.state.name() }),
-            None => Ok(()),
-        }
-    }
-
     pub(super) fn note_refusal(&mut self, order: Order, refusal: &Refusal, at: Tick) {
         self.rejected += 1;
         let clip = |text: String| if text.len() <= TEXT_MAX { text } else { text.chars().take(TEXT_MAX).collect() };
@@ -185,11 +168,6 @@ impl RequestLogic {
             refused: Some(Box::new(order)),
         }));
     }
-}
-
-/// Whether the same again is a new request: it was not imaged, and will not be.
-fn may_be_asked_again(state: State) -> bool {
-    state.is_final() && !matches!(state, State::Completed | State::FulfilledByLink)
 }
 
 fn check_part(order: &Order) -> Result<(), Refusal> {

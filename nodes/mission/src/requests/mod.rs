@@ -1,6 +1,7 @@
 //! Strip requests without ROS and without a store: their life cycle, their logic, and every reason to refuse one.
 
 mod apart;
+mod duplicates;
 pub mod index;
 mod intake;
 pub mod journal;
@@ -12,8 +13,8 @@ pub mod refusal;
 pub mod register;
 pub mod request;
 pub mod restart;
-mod reward;
 mod sharing;
+mod task_reward;
 
 #[cfg(test)]
 mod tests;

@@ -45,6 +45,8 @@ pub enum Reason {
     State = 121,
     /// A filter, an action or a limit of the call is not valid.
     Call = 122,
+    /// There is no room where requests are kept.
+    StoreFull = 123,
     /// The attempt failed on the attitude error.
     Attitude = 201,
     /// The attempt failed on the elevation.
@@ -59,7 +61,7 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, in the order of their numbers.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::None,
         Self::NotFinite,
         Self::Latitude,
@@ -78,6 +80,7 @@ impl Reason {
         Self::Unknown,
         Self::State,
         Self::Call,
+        Self::StoreFull,
         Self::Attitude,
         Self::Elevation,
         Self::Interrupted,
@@ -157,6 +160,7 @@ mod tests {
             StripStatus::REASON_UNKNOWN,
             StripStatus::REASON_STATE,
             StripStatus::REASON_CALL,
+            StripStatus::REASON_STORE_FULL,
             StripStatus::REASON_ATTITUDE,
             StripStatus::REASON_ELEVATION,
             StripStatus::REASON_INTERRUPTED,

@@ -114,6 +114,9 @@ pub enum Refusal {
         /// The step that is not there.
         illegal: IllegalTransition,
     },
+    /// There is no room where requests are kept.
+    #[error("there is no room where requests are kept: nothing can be taken until there is some")]
+    StoreFull,
     /// A value of the call is not valid.
     #[error("{field} is {value}, outside {limits}")]
     Call {
@@ -140,6 +143,7 @@ impl Refusal {
             Self::SameStrip { .. } => Reason::SameStrip,
             Self::Unknown { .. } | Self::UnknownReference { .. } => Reason::Unknown,
             Self::State { .. } => Reason::State,
+            Self::StoreFull => Reason::StoreFull,
             Self::Call { .. } | Self::Attempts { .. } => Reason::Call,
         }
     }

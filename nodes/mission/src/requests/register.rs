@@ -6,17 +6,12 @@ use swath_sim::time::Tick;
 use swath_sim::world::strip::{Strip, StripId, StripRequest};
 use swath_sim::world::windows::Window;
 
+use super::duplicates::{Place, place};
 use super::index::{Area, Index};
 use super::journal::Standing;
 use super::lifecycle::{IllegalTransition, State};
 use super::reason::Reason;
 use super::request::Request;
-
-/// Units of a degree in which strips are compared: about a metre.
-const SAME_PLACE_PER_DEG: f64 = 1e5;
-
-/// Where a strip lies: latitude and longitude of its ends in those units.
-type Place = [i32; 4];
 
 /// The requests that have a number.
 #[derive(Clone, Debug, Default)]
@@ -174,15 +169,4 @@ impl Register {
     pub fn between(&self, from: Tick, until: Tick) -> Vec<StripId> {
         self.index.between(from, until)
     }
-}
-
-fn place(request: &StripRequest) -> Place {
-    let rounded = |degrees: f64| (degrees * SAME_PLACE_PER_DEG).round() as i32;
-    let east = |degrees: f64| rounded(if degrees > 180.0 { degrees - 360.0 } else { degrees });
-    [
-        rounded(request.start_latitude_deg),
-        east(request.start_longitude_deg),
-        rounded(request.end_latitude_deg),
-        east(request.end_longitude_deg),
-    ]
 }

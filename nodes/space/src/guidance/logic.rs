@@ -232,10 +232,8 @@ impl GuidanceLogic {
     }
 
     /// What was ordered befalls it before it looks at the state at `tick`.
-    #[must_use]
-    pub fn struck_at(mut self, tick: Option<Tick>) -> Self {
+    pub fn set_struck_at(&mut self, tick: Option<Tick>) {
         self.strikes_at = tick;
-        self
     }
 
     /// Goes on where a guidance was that is lost: what it flew counts as interrupted.
@@ -284,6 +282,15 @@ impl GuidanceLogic {
             if self.waiting.iter().all(|waiting| waiting.tick < state.tick) {
                 self.waiting.push_back(state);
             }
+            return Vec::new();
+        }
+        // Two states may be under way: if the first one was lost, it comes again, and this one after it.
+        let next = match (&self.latest, &self.before) {
+            (Some(latest), _) => latest.tick.after(1),
+            (None, None) => Tick(0),
+            (None, Some(_)) => state.tick,
+        };
+        if state.tick == next.after(1) {
             return Vec::new();
         }
         self.process(state)

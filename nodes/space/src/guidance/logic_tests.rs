@@ -134,3 +134,27 @@ fn a_task_is_given_up_while_slewing_and_not_once_imaging_has_begun() {
         }
     }
 }
+
+/// Of two states under way the first one may be lost: its command is not left out.
+#[test]
+fn a_state_that_was_lost_is_waited_for() {
+    let model = model();
+    let mut spacecraft = SpacecraftLogic::new(satellite(&model), Tick(1000));
+    let mut guidance = GuidanceLogic::new(model, Tick(1000), 20);
+    let states: Vec<_> = std::iter::once(spacecraft.sample()).chain((0..6).map(|_| spacecraft.advance())).collect();
+    let commanded = |effects: Vec<Effect>| -> Vec<u64> {
+        let tick = |effect: Effect| match effect {
+            Effect::Command(command) => Some(command.tick.0),
+            _ => None,
+        };
+        effects.into_iter().filter_map(tick).collect()
+    };
+    assert!(guidance.on_state(states[1]).is_empty(), "the first one comes again");
+    assert!(matches!(guidance.on_state(states[0])[..], [Effect::Decide(_)]));
+    assert_eq!(commanded(guidance.on_absence(100)), [0]);
+    assert!(guidance.on_state(states[2]).is_empty());
+    assert_eq!(commanded(guidance.on_state(states[1])), [1]);
+    assert_eq!(commanded(guidance.on_state(states[2])), [2]);
+    // In a paced mission time goes on without it.
+    assert_eq!(commanded(guidance.on_state(states[5])), [5]);
+}

@@ -24,6 +24,10 @@ use swath_node::program::{PACE, Program};
 
 /// How long a question without an answer waits before it is asked again.
 const ASK_AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// The same where messages are dropped by order.
+const ASK_SOON_AFTER: Duration = Duration::from_millis(50);
+/// A question is asked at least so often before its deadline.
+const TIMES_ASKED: u32 = 5;
 /// Share of a tick's wall-clock time that planning may take in a paced mission.
 const PACED_SHARE: f64 = 0.8;
 /// How long, instead of the mission's deadline, a task is waited for whose planner may be started again on the way.
@@ -58,8 +62,8 @@ pub fn run() -> Result<()> {
 struct GuidanceNode {
     logic: GuidanceLogic,
     states: Subscription<msg::SpacecraftState>,
-    /// There is one where the sensors are not exact.
-    truths: Option<Subscription<msg::SpacecraftState>>,
+    /// What the sensors do not tell, where they are not exact.
+    truths: Subscription<msg::SpacecraftState>,
     /// States that wait for the truth of their tick, and truths that wait for their states.
     unpaired: (VecDeque<StateSample>, BTreeMap<Tick, BodyState>),
     tasks: Subscription<msg::ImagingTask>,
@@ -73,7 +77,9 @@ struct GuidanceNode {
     /// Task and whether it images, as they were told last.
     phase_told: Option<(u64, bool)>,
     status_every: u64,
+    pace: f64,
     deadline: Duration,
+    ask_again_after: Duration,
     question: Option<Question>,
     /// When there is no planner, by order.
     nobody_plans: Vec<Scheduled>,
@@ -98,31 +104,14 @@ impl GuidanceNode {
         let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
         base.node.parameters().check_given()?;
         let period = base.model.period;
-        let seconds = if pace > 0.0 {
-            (PACED_SHARE * period.seconds() / pace).max(PACED_PATIENCE.as_secs_f64())
-        } else {
-            mission.planning_deadline_s
-        };
-        let planner_lost = mission.faults.of(Process::Planner, period);
-        let restarts = !planner_lost.is_empty() || !mission.faults.of(Process::RequestManager, period).is_empty();
-        let deadline = Duration::from_secs_f64(seconds);
-        let deadline = if restarts && pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
         let hold = period.ticks_ceil(mission.hold_s);
         let delay = period.ticks_ceil(mission.plant.planning_delay_s);
-        Ok(Self {
-            logic: take_up(
-                &base,
-                pace,
-                GuidanceLogic::new((*base.model).clone(), base.horizon, hold)
-                    .with_planning_delay(delay)
-                    .watching(mission.plant.noisy())
-                    .struck_at(base.strikes_at()),
-            )?,
+        let logic = GuidanceLogic::new((*base.model).clone(), base.horizon, hold);
+        let logic = logic.with_planning_delay(delay).watching(mission.plant.noisy());
+        let mut node = Self {
+            logic: take_up(&base, pace, logic)?,
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
-            truths: match mission.tells_truth_apart(period) {
-                true => Some(base.node.subscription(&graph::SPACECRAFT_TRUTH)?),
-                false => None,
-            },
+            truths: base.node.subscription(&graph::SPACECRAFT_TRUTH)?,
             unpaired: Default::default(),
             tasks: base.node.subscription(&graph::PLANNER_TASK)?,
             torques: base.node.publisher(&graph::WHEEL_TORQUE)?,
@@ -136,14 +125,35 @@ impl GuidanceNode {
             radio: RadioGate::new(&base, pace)?,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
-            deadline,
+            pace,
+            deadline: Duration::ZERO,
+            ask_again_after: ASK_AGAIN_AFTER,
             question: None,
-            nobody_plans: planner_lost.into_iter().map(|(it, _)| it).collect(),
+            nobody_plans: Vec::new(),
             kept: None,
             // What the one before has told may be over.
             health_told: base.node.epoch() > 0,
             base,
-        })
+        };
+        node.mind_faults();
+        Ok(node)
+    }
+
+    /// What follows from the faults by order, those that were ordered on the way too.
+    fn mind_faults(&mut self) {
+        let faults = &self.base.mission.faults;
+        let period = self.base.model.period;
+        self.nobody_plans = faults.of(Process::Planner, period).into_iter().map(|(it, _)| it).collect();
+        let restarts = !self.nobody_plans.is_empty() || !faults.of(Process::RequestManager, period).is_empty();
+        let deadline = Duration::from_secs_f64(if self.pace > 0.0 {
+            (PACED_SHARE * period.seconds() / self.pace).max(PACED_PATIENCE.as_secs_f64())
+        } else {
+            self.base.mission.planning_deadline_s
+        });
+        self.deadline = if restarts && self.pace == 0.0 { deadline.max(RESTARTED) } else { deadline };
+        let patience = if faults.drops(period).is_empty() { ASK_AGAIN_AFTER } else { ASK_SOON_AFTER };
+        self.ask_again_after = patience.min(self.deadline / TIMES_ASKED);
+        self.logic.set_struck_at(self.base.strikes_at());
     }
 
     fn turn(&mut self) -> Result<()> {
@@ -182,7 +192,7 @@ impl GuidanceNode {
     }
 
     fn take_states(&mut self) -> Result<()> {
-        while let Some(message) = self.truths.as_ref().map_or(Ok(None), Subscription::take)? {
+        while let Some(message) = self.truths.take()? {
             match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
                 Ok(truth) => _ = self.unpaired.1.insert(truth.tick, truth.body),
                 Err(error) => self.base.alarm(Severity::Error, "truth refused", &error.to_string())?,
@@ -194,6 +204,9 @@ impl GuidanceNode {
                 Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
             }
         }
+        if self.base.take_fault_orders()? {
+            self.mind_faults();
+        }
         while let Some(mut state) = self.unpaired.0.pop_front() {
             let flown = self.logic.wanted().is_none().then(|| self.logic.flown());
             let may_look = self.radio.as_mut().map_or(Ok(true), |it| it.may_look(&self.base, state.tick, flown))?;
@@ -201,9 +214,13 @@ impl GuidanceNode {
                 self.unpaired.0.push_front(state);
                 break;
             }
-            if self.truths.is_some() {
+            if state.tick >= self.base.truth_from() {
                 state.truth = self.unpaired.1.remove(&state.tick);
                 if state.truth.is_none() {
+                    // Truths come in order: one that has not come before a later one is lost, and so is its state.
+                    if self.unpaired.1.keys().next_back().is_some_and(|&last| last > state.tick) {
+                        continue;
+                    }
                     self.unpaired.0.push_front(state);
                     break;
                 }
@@ -243,6 +260,7 @@ impl GuidanceNode {
 
     /// Asks again, or holds the attitude when the answer is late; returns how long there is nothing to do.
     fn mind_question(&mut self) -> Result<Duration> {
+        let again = self.ask_again_after;
         let Some(question) = &mut self.question else { return Ok(ASK_AGAIN_AFTER) };
         if self.logic.wanted() != Some(question.message.task) {
             self.question = None;
@@ -250,11 +268,11 @@ impl GuidanceNode {
         }
         let (task, waited) = (question.message.task, question.asked.elapsed());
         if let Some(left) = self.deadline.checked_sub(waited) {
-            if question.last_asked.elapsed() >= ASK_AGAIN_AFTER {
+            if question.last_asked.elapsed() >= again {
                 question.last_asked = Instant::now();
                 self.points.publish(&question.message)?;
             }
-            return Ok(left.min(ASK_AGAIN_AFTER));
+            return Ok(left.min(again));
         }
         let hold = self.base.mission.hold_s;
         let text =

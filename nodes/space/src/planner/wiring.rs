@@ -62,9 +62,9 @@ struct PlannerNode {
     upcoming: Subscription<msg::UpcomingStrips>,
     tasks: Publisher<msg::ImagingTask>,
     decisions: Publisher<msg::Decision>,
-    status: Option<Publisher<msg::PlannerStatus>>,
+    status: Publisher<msg::PlannerStatus>,
     actions: Publisher<msg::OperatorAction>,
-    /// There are none where there is a radio: nobody on the ground reaches the planner, or sees it.
+    /// There are none where there is a radio: nobody on the ground reaches the planner.
     services: Option<(Server<msg::SetPlannerMode>, Server<msg::ReviewProposal>)>,
     status_told: Option<msg::PlannerStatus>,
     strips: Vec<msg::Candidate>,
@@ -93,10 +93,7 @@ impl PlannerNode {
         let planner = GatedPlanner { gate, planner };
         Ok(Self {
             logic: PlannerLogic::new((*base.model).clone(), planner),
-            status: match base.mission.link {
-                None => Some(base.node.publisher(&graph::PLANNER_STATUS)?),
-                Some(_) => None,
-            },
+            status: base.node.publisher(&graph::PLANNER_STATUS)?,
             actions: base.node.publisher(&graph::PLANNER_ACTIONS)?,
             services: match base.mission.link {
                 None => Some((base.node.server(&graph::SET_PLANNER_MODE)?, base.node.server(&graph::REVIEW_PROPOSAL)?)),
@@ -111,17 +108,19 @@ impl PlannerNode {
             last: None,
             now: Tick(0),
             fault_told: None,
-            away: base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect(),
+            away: away(&base),
             base,
         })
     }
 
     fn turn(&mut self) -> Result<()> {
+        self.take_fault_orders()?;
         while let Some(point) = self.points.take()? {
             if point.mission_over {
                 continue;
             }
             let tick = Tick(point.tick);
+            self.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| tick >= at) {
                 let _ = self.decisions.flush(FLUSH_TIMEOUT);
                 self.base.strike();
@@ -159,6 +158,13 @@ impl PlannerNode {
         self.take_orders()?;
         self.tell_status()?;
         self.base.wait(IDLE)?;
+        Ok(())
+    }
+
+    fn take_fault_orders(&mut self) -> Result<()> {
+        if self.base.take_fault_orders()? {
+            self.away = away(&self.base);
+        }
         Ok(())
     }
 
@@ -200,7 +206,6 @@ impl PlannerNode {
 
     /// Tells the mode and the proposal when they have changed.
     fn tell_status(&mut self) -> Result<()> {
-        let Some(topic) = &self.status else { return Ok(()) };
         let proposed = self.logic.gate().proposal().map(|proposal| proposal.candidate.id.0);
         let known = self.status_told.as_ref().map(|status| &status.strip).filter(|strip| Some(strip.id) == proposed);
         let offered = self.strips.iter().map(|candidate| &candidate.strip);
@@ -210,7 +215,7 @@ impl PlannerNode {
         let same =
             |told: &msg::PlannerStatus| msg::PlannerStatus { header: told.header.clone(), ..status.clone() } == *told;
         if !self.status_told.as_ref().is_some_and(same) {
-            topic.publish(&status)?;
+            self.status.publish(&status)?;
             self.status_told = Some(status);
         }
         Ok(())
@@ -231,6 +236,11 @@ impl PlannerNode {
         self.last = Some(task);
         Ok(())
     }
+}
+
+/// When there is no planner, by order.
+fn away(base: &MissionNode) -> Vec<Scheduled> {
+    base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect()
 }
 
 /// The mode that is asked for, else the one that operators set before this planner was started again, else the mission's.

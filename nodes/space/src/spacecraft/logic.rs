@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use swath_sim::time::Tick;
+use swath_sim::vehicle::faults::TimedFault;
 use swath_sim::vehicle::spacecraft::{Spacecraft, StateSample};
 use thiserror::Error;
 
@@ -48,10 +49,13 @@ impl SpacecraftLogic {
     }
 
     /// Between these ticks there is no guidance, by order: the wheels hold no torque where it would have commanded.
-    #[must_use]
-    pub fn without_guidance(mut self, without: Vec<(Tick, Tick)>) -> Self {
+    pub fn set_without_guidance(&mut self, without: Vec<(Tick, Tick)>) {
         self.without = without;
-        self
+    }
+
+    /// From now on wheels and sensors have these faults, too.
+    pub fn suffer(&mut self, faults: impl IntoIterator<Item = TimedFault>) {
+        self.spacecraft.suffer(faults);
     }
 
     /// Simulated time.
@@ -162,7 +166,8 @@ mod tests {
 
     #[test]
     fn without_guidance_no_command_is_waited_for() {
-        let mut spacecraft = spacecraft().without_guidance(vec![(Tick(1), Tick(3))]);
+        let mut spacecraft = spacecraft();
+        spacecraft.set_without_guidance(vec![(Tick(1), Tick(3))]);
         let torque = Vector3::new(0.1, -0.2, 0.3);
         spacecraft.command(Tick(0), torque).unwrap();
         spacecraft.advance();

@@ -2,5 +2,6 @@
 
 pub mod journal;
 pub mod logic;
+mod orders;
 mod telemetry;
 pub mod wiring;

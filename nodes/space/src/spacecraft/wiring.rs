@@ -12,8 +12,10 @@ use swath_sim::time::Tick;
 
 use super::journal::Journal;
 use super::logic::SpacecraftLogic;
+use super::orders::OrderDesk;
 use super::telemetry::{self, Telemetry};
 use swath_mission::alarms::conditions::back;
+use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::Process;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::node::{MissionNode, Severity};
@@ -22,6 +24,8 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 /// In lockstep, states without an answer for so long are sent again.
 const RESEND_AFTER: Duration = Duration::from_millis(300);
+/// The same where messages are dropped by order, and in a paced mission.
+const RESEND_SOON_AFTER: Duration = Duration::from_millis(20);
 /// How long the last messages may take to reach their readers.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// In a paced mission, how long a late command is waited for where ticks are shorter than that.
@@ -57,10 +61,12 @@ struct SpacecraftNode {
     logic: SpacecraftLogic,
     clock: Publisher<Clock>,
     states: Publisher<SpacecraftState>,
-    /// There is one where the sensors are not exact.
-    truths: Option<Publisher<SpacecraftState>>,
+    /// Tells what the sensors do not, where they are not exact.
+    truths: Publisher<SpacecraftState>,
     commands: Subscription<WheelTorque>,
     telemetry: Telemetry,
+    orders: OrderDesk,
+    resend_after: Duration,
     unanswered: VecDeque<StateSample>,
     /// There is one where somebody would start the spacecraft again.
     journal: Option<Journal>,
@@ -71,7 +77,7 @@ struct SpacecraftNode {
 }
 
 impl SpacecraftNode {
-    fn new(base: MissionNode) -> Result<Self> {
+    fn new(mut base: MissionNode) -> Result<Self> {
         let parameters = base.node.parameters();
         let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
         let pace = parameters.declare(pace.in_range(0.0..=1e6).read_only())?;
@@ -82,22 +88,21 @@ impl SpacecraftNode {
         let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
         let telemetry = Telemetry::new(&base)?;
         parameters.check_given()?;
-        let lost = base.mission.faults.of(Process::Guidance, base.model.period);
-        let without = lost.iter().map(|(it, _)| (it.from, back(it))).collect();
-        let logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
-        let (journal, unanswered, logic) = take_up(&base, logic.without_guidance(without))?;
+        let orders = OrderDesk::new(&mut base)?;
+        let mut logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
+        logic.set_without_guidance(without_guidance(&base));
+        let (journal, unanswered, logic) = take_up(&base, logic)?;
         Ok(Self {
             logic,
             journal,
             unanswered,
             clock: base.node.publisher(&graph::CLOCK)?,
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
-            truths: match base.mission.tells_truth_apart(base.model.period) {
-                true => Some(base.node.publisher(&graph::SPACECRAFT_TRUTH)?),
-                false => None,
-            },
+            truths: base.node.publisher(&graph::SPACECRAFT_TRUTH)?,
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
             telemetry,
+            orders,
+            resend_after: resend_after(&base),
             pace,
             peers,
             peer_timeout: Duration::from_secs_f64(timeout),
@@ -131,18 +136,19 @@ impl SpacecraftNode {
         let mut progress = Instant::now();
         while !self.logic.done() && !self.base.shutdown.asked() {
             self.take_commands()?;
+            self.take_orders()?;
             let before = self.logic.now();
             while self.logic.ready() && !self.logic.done() {
                 self.advance()?;
             }
             if self.logic.now() > before {
                 progress = Instant::now();
-            } else if progress.elapsed() > RESEND_AFTER {
+            } else if progress.elapsed() > self.resend_after {
                 self.resend()?;
                 progress = Instant::now();
             }
             if !self.logic.ready() {
-                self.base.wait(RESEND_AFTER)?;
+                self.base.wait(self.resend_after)?;
             }
         }
         Ok(())
@@ -155,14 +161,22 @@ impl SpacecraftNode {
         let tick = Duration::from_secs_f64(self.base.model.period.seconds() / self.pace);
         let mut due = Instant::now() + tick;
         let mut latest = due.max(Instant::now() + COMMAND_PATIENCE);
+        let mut told = Instant::now();
         while !self.logic.done() && !self.base.shutdown.asked() {
             self.take_commands()?;
+            self.take_orders()?;
             let now = Instant::now();
             let wanted = if self.logic.ready() { due } else { latest };
             if now < wanted {
-                self.base.wait(wanted - now)?;
+                if !self.logic.ready() && told.elapsed() >= RESEND_SOON_AFTER {
+                    self.resend()?;
+                    told = Instant::now();
+                }
+                let left = wanted - now;
+                self.base.wait(if self.logic.ready() { left } else { left.min(RESEND_SOON_AFTER) })?;
                 continue;
             }
+            told = now;
             due += tick;
             latest = due.max(now + COMMAND_PATIENCE);
             self.advance()?;
@@ -193,6 +207,20 @@ impl SpacecraftNode {
         Ok(())
     }
 
+    /// Takes the faults that are ordered; those of wheels and sensors befall it at their ticks.
+    fn take_orders(&mut self) -> Result<()> {
+        let before = self.base.mission.faults.plan.len();
+        if !self.orders.take(&mut self.base, self.logic.now())? {
+            return Ok(());
+        }
+        let new = self.base.mission.faults.plan.iter().skip(before).copied().collect();
+        let new = FaultPlan { plan: new, random: 0 };
+        self.logic.suffer(new.vehicle(self.base.model.period));
+        self.logic.set_without_guidance(without_guidance(&self.base));
+        self.resend_after = resend_after(&self.base);
+        Ok(())
+    }
+
     fn publish(&mut self, sample: &StateSample) -> Result<()> {
         self.base.set_now(sample.tick);
         self.clock.publish(&Clock { clock: self.base.stamper.time(sample.tick) })?;
@@ -205,8 +233,8 @@ impl SpacecraftNode {
     }
 
     fn tell(&self, sample: &StateSample) -> Result<()> {
-        if let (Some(truths), Some(body)) = (&self.truths, sample.truth) {
-            truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
+        if let Some(body) = sample.truth {
+            self.truths.publish(&spacecraft_state(&self.base.stamper, &StateSample { body, ..*sample }))?;
         }
         Ok(self.states.publish(&spacecraft_state(&self.base.stamper, sample))?)
     }
@@ -216,7 +244,7 @@ impl SpacecraftNode {
         self.unanswered.iter().try_for_each(|sample| self.tell(sample))
     }
 
-    fn linger(&self) -> Result<()> {
+    fn linger(&mut self) -> Result<()> {
         let (states, clock) = (self.states.flush(FLUSH_TIMEOUT), self.clock.flush(FLUSH_TIMEOUT));
         if !(states && clock) {
             tracing::warn!("not every reader has the last state and time");
@@ -225,9 +253,22 @@ impl SpacecraftNode {
             self.base.wait(FLUSH_TIMEOUT)?;
             // The last state is the one that ends the mission: it must arrive.
             while self.commands.take()?.is_some() {}
+            self.take_orders()?;
         }
         Ok(())
     }
+}
+
+/// In lockstep, after how long without an answer states are sent again.
+fn resend_after(base: &MissionNode) -> Duration {
+    let dropped = !base.mission.faults.drops(base.model.period).is_empty();
+    if dropped { RESEND_SOON_AFTER } else { RESEND_AFTER }
+}
+
+/// Between which states there is no guidance, by order.
+fn without_guidance(base: &MissionNode) -> Vec<(Tick, Tick)> {
+    let lost = base.mission.faults.of(Process::Guidance, base.model.period);
+    lost.iter().map(|(it, _)| (it.from, back(it))).collect()
 }
 
 /// The file of the commands that were flown.

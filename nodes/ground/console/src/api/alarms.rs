@@ -14,6 +14,7 @@ use super::answers::DOOR;
 use crate::desks::call;
 use crate::extract::Json;
 use crate::guard::Caller;
+use crate::numbers::{small, wholes};
 use crate::problem::Problem;
 use crate::server::{Home, Server};
 
@@ -26,6 +27,7 @@ pub(super) fn routes() -> OpenApiRouter<Arc<Server>> {
 #[serde(deny_unknown_fields)]
 struct Seen {
     /// Their numbers.
+    #[serde(deserialize_with = "wholes")]
     ids: Vec<u64>,
 }
 
@@ -34,8 +36,10 @@ struct Seen {
 #[serde(deny_unknown_fields)]
 struct Aside {
     /// Their numbers.
+    #[serde(deserialize_with = "wholes")]
     ids: Vec<u64>,
     /// For how long, in simulated time [min].
+    #[serde(deserialize_with = "small")]
     #[schema(minimum = 1, maximum = 43_200)]
     minutes: u32,
     /// Why.

@@ -11,7 +11,7 @@ use axum::Extension;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::{CONTENT_TYPE, SET_COOKIE};
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -21,9 +21,11 @@ use utoipa_axum::routes;
 use self::answers::Done;
 use crate::extract::{Json, Params};
 use crate::guard::{COOKIE_NAME, Caller};
+use crate::guests::Guest;
+use crate::numbers::whole;
 use crate::problem::Problem;
 use crate::server::{Home, Server};
-use crate::stream;
+use crate::stream::{self, Reader};
 use crate::tokens::Role;
 
 /// Where a browser hands in its token.
@@ -82,31 +84,54 @@ async fn info(State(server): Home, Extension(caller): Extension<Caller>) -> Json
     })
 }
 
+/// An event of the stream.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "it is written by hand")]
+struct Event {
+    /// `facts` or `restart`.
+    event: String,
+    /// Where the reader is: RUN.NUMBER.
+    id: Option<String>,
+    /// A JSON array of facts.
+    data: String,
+}
+
 /// Facts as server-sent events: `facts` holds an array, its id is RUN.NUMBER, `restart` says that numbers begin anew.
 #[utoipa::path(get, path = "/api/facts", tag = "console",
     params(("Last-Event-ID" = Option<String>, Header, description = "where a reader was")),
-    responses((status = 200, description = "events", content_type = "text/event-stream", body = String), Problem))]
-async fn facts(State(server): Home, headers: HeaderMap) -> Response {
+    responses((status = 200, description = "events", content_type = "text/event-stream", body = Event), Problem))]
+async fn facts(
+    State(server): Home,
+    guest: Option<Extension<Arc<Guest>>>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let room = Arc::clone(&server.readers).try_acquire_owned();
+    let room = room.map_err(|_| {
+        let detail = format!("{} others read the facts already; /api/log tells them page by page", stream::READERS);
+        Problem::new(StatusCode::SERVICE_UNAVAILABLE, detail)
+    })?;
     let last = headers.get("last-event-id").and_then(|value| value.to_str().ok());
     let place = stream::place(last, &server.run);
-    let body = stream::body(server.site.shared.clone(), server.run.clone(), place);
-    ([(CONTENT_TYPE, stream::MEDIA_TYPE)], Body::new(body)).into_response()
+    let (shared, run, guest) = (server.site.shared.clone(), server.run.clone(), guest.map(|it| it.0));
+    let admitted = Box::new(move || server.site.guard.caller(&headers).is_ok());
+    let body = stream::body(shared, run, place, Reader { room, guest, admitted });
+    Ok(([(CONTENT_TYPE, stream::MEDIA_TYPE)], Body::new(body)).into_response())
 }
 
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct After {
     /// Only facts with greater numbers.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole")]
     #[param(minimum = 0)]
-    after: usize,
+    after: u64,
 }
 
 /// Facts, page by page.
 #[utoipa::path(get, path = "/api/log", tag = "console", params(After),
     responses((status = 200, description = "as asked", body = Vec<serde_json::Value>), Problem))]
 async fn log(State(server): Home, Params(After { after }): Params<After>) -> Response {
-    let (_, facts) = server.site.shared.batch(after, PAGE);
+    let (_, facts) = server.site.shared.batch(usize::try_from(after).unwrap_or(usize::MAX), PAGE);
     ([(CONTENT_TYPE, "application/json")], facts).into_response()
 }
 

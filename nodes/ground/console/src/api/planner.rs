@@ -14,6 +14,7 @@ use super::answers::{DOOR, Done, accepted};
 use crate::desks::{call, call_once};
 use crate::extract::Json;
 use crate::guard::Caller;
+use crate::numbers::whole;
 use crate::problem::Problem;
 use crate::server::{Home, Server};
 
@@ -42,6 +43,7 @@ struct NewMode {
 #[serde(deny_unknown_fields)]
 struct Verdict {
     /// Number of the proposal.
+    #[serde(deserialize_with = "whole")]
     #[schema(minimum = 0)]
     proposal: u64,
     /// Whether it is flown.

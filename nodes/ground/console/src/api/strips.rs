@@ -17,6 +17,7 @@ use super::answers::DOOR;
 use crate::extract::{Json, Named};
 use crate::facts::milliseconds;
 use crate::guard::Caller;
+use crate::numbers::wholes;
 use crate::problem::Problem;
 use crate::server::{Home, Server};
 use crate::wishes;
@@ -36,9 +37,11 @@ pub(super) fn routes() -> OpenApiRouter<Arc<Server>> {
 #[serde(deny_unknown_fields)]
 struct Submission {
     /// Name of the file, or of whatever else they are from.
+    #[schema(example = "wishes.geojson")]
     name: String,
     /// The strips: lines and areas, as `swath strips submit` takes them.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Object, example = json!({ "type": "Feature", "properties": { "name": "coast" },
+        "geometry": { "type": "LineString", "coordinates": [[10.0, 40.0], [10.4, 41.0]] } }))]
     geojson: Value,
 }
 
@@ -47,6 +50,7 @@ struct Submission {
 #[serde(deny_unknown_fields)]
 struct Cancellation {
     /// Numbers of the requests.
+    #[serde(deserialize_with = "wholes")]
     ids: Vec<u64>,
     /// Why.
     #[serde(default)]
@@ -58,6 +62,7 @@ struct Cancellation {
 #[serde(deny_unknown_fields)]
 struct Review {
     /// Numbers of the requests.
+    #[serde(deserialize_with = "wholes")]
     ids: Vec<u64>,
     action: ReviewAction,
     /// Why.
@@ -91,6 +96,7 @@ struct Outcome {
 
 /// A chance to image a strip.
 #[derive(Serialize, ToSchema)]
+#[schema(as = Chance)]
 struct Opportunity {
     /// When imaging may start at the earliest [ms since 1970-01-01 UTC].
     open_ms: f64,

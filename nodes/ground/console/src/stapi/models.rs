@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use crate::numbers::{perhaps_small, perhaps_whole};
+use crate::schemas::interval;
+
 /// The version of the specification.
 pub const VERSION: &str = "0.1.0";
 /// The one product: an image of strips.
@@ -111,14 +114,14 @@ pub struct Products {
     pub links: Vec<Link>,
 }
 
-/// A line or an area, longitude before latitude [deg].
+/// A line or an area, longitude before latitude [deg]; other members are passed over.
 #[derive(Clone, Debug, Deserialize, Serialize, ToSchema)]
-#[serde(tag = "type", deny_unknown_fields)]
+#[serde(tag = "type")]
 pub enum Shape {
     /// A line; a longer one than a strip may be, or one that bends, becomes several strips.
     LineString {
         /// Its points.
-        #[schema(min_items = 2)]
+        #[schema(min_items = 2, example = json!([[10.0, 40.0], [10.4, 41.0]]))]
         coordinates: Vec<Vec<f64>>,
     },
     /// An area, covered by strips.
@@ -153,7 +156,7 @@ pub struct OrderParameters {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hold_for_approval: Option<bool>,
     /// Attempts before it fails.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "perhaps_small")]
     #[schema(minimum = 0)]
     pub max_attempts: Option<u32>,
 }
@@ -162,7 +165,7 @@ pub struct OrderParameters {
 #[derive(Deserialize, ToSchema)]
 pub struct OrderPayload {
     /// Simulated times between which it is to be imaged; `..` for an open end.
-    #[schema(example = "2026-01-01T00:00:00Z/2026-01-02T00:00:00Z")]
+    #[schema(schema_with = interval)]
     pub datetime: String,
     pub geometry: Shape,
     /// Orders take none: the planner chooses when to image.
@@ -177,7 +180,7 @@ pub struct OrderPayload {
 #[derive(Clone, Deserialize, Serialize, ToSchema)]
 pub struct OpportunityPayload {
     /// Simulated times between which imaging may start; `..` for an open end.
-    #[schema(example = "2026-01-01T00:00:00Z/2026-01-02T00:00:00Z")]
+    #[schema(schema_with = interval)]
     pub datetime: String,
     pub geometry: Shape,
     /// CQL2-JSON over the queryables: comparisons, `between`, `and`, `or`, `not`.
@@ -185,12 +188,13 @@ pub struct OpportunityPayload {
     #[schema(value_type = Option<Object>)]
     pub filter: Option<Value>,
     /// Most opportunities of a page.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "perhaps_small")]
     #[schema(minimum = 1, maximum = 100)]
     pub limit: Option<u32>,
     /// Where the next page begins, as the page before says.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub next: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "perhaps_whole")]
+    #[schema(minimum = 0)]
+    pub next: Option<u64>,
 }
 
 /// A chance to image a strip.

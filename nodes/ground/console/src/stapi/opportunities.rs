@@ -46,18 +46,19 @@ async fn search(
     if !(1..=LIMIT_MAX).contains(&limit) {
         return Err(Problem::bad(format!("limit is {limit}, outside 1 to {LIMIT_MAX}")));
     }
-    let from: usize = match asked.next.as_deref() {
-        None => 0,
-        Some(next) => next.parse().map_err(|_| Problem::bad(format!("next is {next:?}, which no page gave")))?,
-    };
-    let (start, end) = times::parse(&asked.datetime).map_err(Problem::bad)?;
+    let from = usize::try_from(asked.next.unwrap_or(0)).unwrap_or(usize::MAX);
+    let (start, end) = times::parse(&asked.datetime).map_err(Problem::unfit)?;
     let feature = json!({ "type": "Feature", "properties": {}, "geometry": asked.geometry });
     let import = wishes::read(server.counter()?, "search", &feature, DOOR).await?;
     if let Some(fault) = import.refused.first() {
         return Err(Problem::unfit(fault.reason.clone()));
     }
-    let limits =
-        Limits { start, end, filter: asked.filter.as_ref(), period_s: server.site.shared.read(|it| it.tick_s()) };
+    let limits = Limits {
+        start,
+        end,
+        filter: asked.filter.as_ref().filter(|it| **it != json!({})),
+        period_s: server.site.shared.read(|it| it.tick_s()),
+    };
     let answers = wishes::preview(server.counter()?, import.orders.clone()).await?;
     let mut found = Vec::new();
     for (order, answer) in import.orders.iter().zip(&answers) {
@@ -71,7 +72,7 @@ async fn search(
     let mut further = vec![Link::post("create-order", links.product("/orders"), GEOJSON, Some(body))];
     let next = from.saturating_add(features.len());
     if next < all {
-        let body = OpportunityPayload { next: Some(next.to_string()), limit: Some(limit), ..asked };
+        let body = OpportunityPayload { next: Some(next as u64), limit: Some(limit), ..asked };
         let body = serde_json::to_value(body).ok();
         further.push(Link::post("next", links.product("/opportunities"), GEOJSON, body));
     }
@@ -147,6 +148,6 @@ impl Limits<'_> {
             "conflicts" => Some(Some(f64::from(it.conflicts))),
             _ => None,
         };
-        self.filter.map_or(Ok(true), |filter| filter::matches(filter, &value).map_err(Problem::bad))
+        self.filter.map_or(Ok(true), |filter| filter::matches(filter, &value).map_err(Problem::unfit))
     }
 }

@@ -24,6 +24,7 @@ use super::models::{
 use super::status;
 use crate::extract::{GeoJson, Json, Named, Params};
 use crate::guard::Caller;
+use crate::numbers::perhaps_whole;
 use crate::problem::Problem;
 use crate::server::{Home, Server};
 use crate::shapes::{Ends, bbox, lines};
@@ -42,6 +43,8 @@ pub(super) fn routes() -> OpenApiRouter<Arc<Server>> {
 const LIMIT: usize = 10;
 /// Most orders of a page.
 const LIMIT_MAX: usize = 100;
+/// Longest reason [characters].
+const REASON_MAX: usize = 1000;
 
 /// Which orders.
 #[derive(Deserialize, IntoParams)]
@@ -51,7 +54,9 @@ struct Page {
     #[param(minimum = 1, maximum = 100)]
     limit: Option<usize>,
     /// Where the next page begins, as the page before says.
-    next: Option<String>,
+    #[serde(default, deserialize_with = "perhaps_whole")]
+    #[param(minimum = 0)]
+    next: Option<u64>,
 }
 
 /// Why an order is taken back.
@@ -59,7 +64,7 @@ struct Page {
 #[into_params(parameter_in = Query)]
 struct Why {
     /// The reason.
-    #[param(max_length = 200)]
+    #[param(max_length = 1000)]
     reason: Option<String>,
 }
 
@@ -131,10 +136,7 @@ async fn page(server: &Server, asked: Page, path: String, links: &Links) -> Resu
     if !(1..=LIMIT_MAX).contains(&limit) {
         return Err(Problem::bad(format!("limit is {limit}, outside 1 to {LIMIT_MAX}")));
     }
-    let after: u64 = match asked.next.as_deref() {
-        None => 0,
-        Some(next) => next.parse().map_err(|_| Problem::bad(format!("next is {next:?}, which no page gave")))?,
-    };
+    let after = asked.next.unwrap_or(0);
     let all = groups::all(server);
     let number_matched = all.len();
     let begin = all.partition_point(|ids| ids.first().is_none_or(|first| *first <= after));
@@ -178,7 +180,7 @@ async fn list(
 
 /// The order as a feature, as files have it.
 fn feature(payload: &OrderPayload) -> Result<Value, Problem> {
-    let (start, end) = times::parse(&payload.datetime).map_err(Problem::bad)?;
+    let (start, end) = times::parse(&payload.datetime).map_err(Problem::unfit)?;
     if payload.filter.as_ref().is_some_and(|it| !it.is_null() && *it != json!({})) {
         return Err(Problem::unfit("an order takes no filter: the planner chooses when to image"));
     }
@@ -253,9 +255,13 @@ async fn cancel(
     Named(id): Named<String>,
     Params(Why { reason }): Params<Why>,
 ) -> Result<GeoJson<Order>, Problem> {
+    let reason = reason.unwrap_or_default();
+    if reason.chars().count() > REASON_MAX {
+        return Err(Problem::bad(format!("the reason is longer than {REASON_MAX} characters")));
+    }
     let counter = server.counter()?;
     let ids = groups::one(&server, &id)?;
-    let results = wishes::cancel(counter, ids.clone(), caller.actor(DOOR), reason.unwrap_or_default()).await?;
+    let results = wishes::cancel(counter, ids.clone(), caller.actor(DOOR), reason).await?;
     if results.iter().all(|it| !it.accepted) {
         let why = results.into_iter().next().unwrap_or_default();
         return Err(Problem::new(StatusCode::CONFLICT, format!("{} (reason {})", why.reason, why.reason_code)));

@@ -53,12 +53,16 @@ fn doors() -> &'static Doors {
 }
 
 impl Doors {
-    /// Status, head and what has come of the body when the head was there.
-    fn ask(&self, method: &str, path: &str, token: Option<&str>, more: &str, body: &str) -> (u16, String) {
+    fn connect(&self) -> StreamOwned<ClientConnection, TcpStream> {
         let stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         let name = ServerName::try_from("localhost").unwrap();
-        let mut stream = StreamOwned::new(ClientConnection::new(Arc::clone(&self.client), name).unwrap(), stream);
+        StreamOwned::new(ClientConnection::new(Arc::clone(&self.client), name).unwrap(), stream)
+    }
+
+    /// Status, head and what has come of the body when the head was there.
+    fn ask(&self, method: &str, path: &str, token: Option<&str>, more: &str, body: &str) -> (u16, String) {
+        let mut stream = self.connect();
         let (port, length) = (self.address.port(), body.len());
         let token = token.map_or_else(String::new, |it| format!("Authorization: Bearer {it}\r\n"));
         let request = format!(
@@ -134,6 +138,31 @@ fn a_browser_hands_in_its_token_and_gets_a_cookie_that_no_page_reads() {
     // Another server's page has the browser's cookie with it, and is refused by its origin.
     let foreign = format!("Cookie: {pair}\r\nOrigin: https://evil.example\r\n{JSON}");
     assert_eq!(doors.ask("POST", "/api/strips/preview", None, &foreign, "{}").0, 403);
+}
+
+#[test]
+fn a_token_that_is_revoked_ends_the_stream_that_it_opened() {
+    let doors = doors();
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("doors/tokens.toml");
+    let mut tokens = Tokens::read(&path).unwrap();
+    let secret = tokens.add("leaver", Role::Viewer, u64::MAX / 2).unwrap();
+    tokens.write(&path).unwrap();
+    let mut stream = doors.connect();
+    let head = format!("Host: localhost:{}\r\nAuthorization: Bearer {secret}\r\n\r\n", doors.address.port());
+    stream.write_all(format!("GET /api/facts HTTP/1.1\r\n{head}").as_bytes()).unwrap();
+    let mut first = [0; 12];
+    stream.read_exact(&mut first).unwrap();
+    assert_eq!(&first, b"HTTP/1.1 200");
+    let mut tokens = Tokens::read(&path).unwrap();
+    tokens.revoke("leaver").unwrap();
+    tokens.write(&path).unwrap();
+    let begin = Instant::now();
+    let mut piece = [0; 65536];
+    // Signs of life come before the read gives up: an end is what the server makes.
+    while stream.read(&mut piece).is_ok_and(|count| count > 0) {
+        assert!(begin.elapsed() < Duration::from_secs(15), "it is still told of the mission");
+    }
+    assert_eq!(doors.ask("GET", "/api/info", Some(&secret), "", "").0, 401);
 }
 
 #[test]

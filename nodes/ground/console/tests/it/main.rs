@@ -4,5 +4,7 @@
 
 mod bundle;
 mod doors;
+mod gdal;
+mod hostile;
 mod page;
 mod server;

@@ -1,14 +1,17 @@
 """Looks at a replayed mission in a browser: python page.py URL FOLDER; prints what it saw as JSON, leaves pictures."""
 
+import gzip
 import json
 import os
 import shutil
 import sys
+import urllib.request
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
 URL, FOLDER = sys.argv[1], Path(sys.argv[2])
+FILES = ["", "console.js", "console.css", "stream.js", "icon.svg"]
 NAMES = ["chromium", "chromium-browser", "google-chrome"]
 CHROMIUM = os.environ.get("SWATH_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
 if CHROMIUM is None:
@@ -41,7 +44,7 @@ def look(page, saw):
     saw["states"] = [[last, legend(page)]]
     page.get_by_role("button", name="whole").nth(1).click()
     page.wait_for_timeout(500)
-    page.screenshot(path=FOLDER / "console.png")
+    page.screenshot(path=FOLDER / "replay.png")
     for share in (0.25, 0.5, 0.75):
         time_ms = at(page, first + share * (last - first))
         saw["states"].append([time_ms, legend(page)])
@@ -62,6 +65,7 @@ def look(page, saw):
 
 def main():
     saw = {"elsewhere": [], "errors": []}
+    saw["gzipped"] = sum(len(gzip.compress(urllib.request.urlopen(URL + name).read(), 9)) for name in FILES)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1500, "height": 900})

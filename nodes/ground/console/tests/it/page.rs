@@ -37,6 +37,7 @@ fn the_page_shows_what_the_facts_say() {
     let saw: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&saw["elsewhere"], &saw["errors"]), (&serde_json::json!([]), &serde_json::json!([])));
     assert_eq!(saw["title"], "Swath one orbit");
+    assert!(saw["gzipped"].as_u64().unwrap() < 200_000, "{}", saw["gzipped"]);
     // No way to submit in a recording.
     assert_eq!(saw["tabs"], serde_json::json!(["requests", "planner", "alarms"]));
     let facts = log();

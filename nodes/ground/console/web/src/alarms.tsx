@@ -31,7 +31,7 @@ export function Alarms() {
         <p class="empty">No alarm has been raised.</p>
       ) : (
         <table class="wide">
-          <thead><tr><th>last raised</th><th>level</th><th>by</th><th>what</th><th /></tr></thead>
+          <thead><tr><th>raised</th><th>level</th><th>by</th><th>what</th><th /></tr></thead>
           <tbody>{alarms.map((alarm) => <Line key={alarm.alarm} alarm={alarm} stands={stands(alarm)} t={t} />)}</tbody>
         </table>
       )}
@@ -58,7 +58,7 @@ function Line({ alarm, stands, t }: { alarm: Alarm; stands: boolean; t: number }
   const aside = alarm.aside && alarm.aside.until_ms > t ? alarm.aside : undefined;
   return (
     <tr class={stands ? "" : "quiet"}>
-      <td class="number">{stamp(alarm.t)}</td>
+      <td class="number" title={stamp(alarm.t)}>{clock(alarm.t)}</td>
       <td><span class={stands ? (severe ? "pill bad" : "pill warn") : "pill"}>{alarm.level > 2 ? "critical" : severe ? "error" : "warning"}</span></td>
       <td>{alarm.name}</td>
       <td>

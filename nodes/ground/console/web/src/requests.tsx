@@ -16,6 +16,7 @@ const SPARE = 10;
 
 const text = signal("");
 const state = signal(-1);
+const submitter = signal("");
 const onlyInView = signal(false);
 const order = signal<"id" | "closes" | "changed">("changed");
 
@@ -32,6 +33,7 @@ const rows = computed<Row[]>(() => {
     const change = now.changeAt(strip, t);
     if (!change || (state.value >= 0 && change.state !== state.value)) continue;
     if (sought && !`${strip.id} ${strip.name} ${strip.submitter} ${strip.client_ref}`.toLowerCase().includes(sought)) continue;
+    if (submitter.value && strip.submitter !== submitter.value) continue;
     if (onlyInView.value && !inView(strip)) continue;
     found.push({ strip, change });
   }
@@ -41,10 +43,13 @@ const rows = computed<Row[]>(() => {
   return found;
 });
 
+const submitters = computed(() => [...new Set([...world.value.strips.values()].map((strip) => strip.submitter))].sort());
+
 /** Shows the requests in one state. */
 export function onlyState(wanted: number): void {
   panel.value = "requests";
   text.value = "";
+  submitter.value = "";
   state.value = wanted;
 }
 
@@ -64,7 +69,7 @@ function Filters() {
     <div class="filters">
       <input
         type="search"
-        placeholder="number, name, submitter"
+        placeholder="number, name"
         aria-label="filter by text"
         value={text.value}
         onInput={(event) => (text.value = event.currentTarget.value)}
@@ -73,6 +78,12 @@ function Filters() {
         <option value={-1}>every state</option>
         {STATES.map((look, number) => <option key={number} value={number}>{look.name}</option>)}
       </select>
+      {submitters.value.length > 1 && (
+        <select aria-label="filter by submitter" value={submitter.value} onChange={(event) => (submitter.value = event.currentTarget.value)}>
+          <option value="">everybody's</option>
+          {submitters.value.map((name) => <option key={name} value={name}>{name}</option>)}
+        </select>
+      )}
       <select aria-label="order" value={order.value} onChange={(event) => (order.value = event.currentTarget.value as "id")}>
         <option value="changed">last changed</option>
         <option value="closes">closing soon</option>

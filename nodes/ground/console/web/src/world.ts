@@ -63,8 +63,8 @@ export class World {
   readonly summaries: f.SummaryFact[] = [];
   readonly refused: f.RefusedFact[] = [];
   readonly alarms = new Map<number, Alarm>();
+  /** Which nodes are there, and how often each has come back. */
   nodes: f.NodesFact | undefined;
-  /** Nodes that have been there, and how often each has come back. */
 
   take(fact: f.Fact): void {
     if (fact.t > 0) {

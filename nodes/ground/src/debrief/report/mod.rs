@@ -1,6 +1,8 @@
 //! `swath report`: a recorded mission as one page that needs no network.
 
+mod alarms;
 mod figures;
+mod markup;
 mod page;
 mod story;
 

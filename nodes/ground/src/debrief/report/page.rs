@@ -8,8 +8,9 @@ use swath_msgs::swath_msgs as msg;
 use swath_sim::task::Totals;
 use swath_sim::time::TickPeriod;
 
-use super::figures;
+use super::markup::escaped;
 use super::story::Story;
+use super::{alarms, figures};
 use crate::debrief::recorded::Recorded;
 
 const STYLE: &str = include_str!("style.css");
@@ -17,7 +18,7 @@ const STYLE: &str = include_str!("style.css");
 /// The page.
 ///
 /// # Errors
-/// When a plot cannot be drawn.
+/// When a plot cannot be drawn, or the bag cannot be read.
 pub fn page(recorded: &Recorded, story: &Story) -> Result<String> {
     let name = escaped(&recorded.mission.name);
     // The policy keeps the page from asking anything of a network.
@@ -29,6 +30,7 @@ pub fn page(recorded: &Recorded, story: &Story) -> Result<String> {
     );
     facts(&mut html, recorded, story);
     orders(&mut html, story);
+    alarms::tables(&mut html, recorded)?;
     plots(&mut html, story)?;
     tasks(&mut html, story);
     decisions(&mut html, recorded);
@@ -185,29 +187,4 @@ fn candidate_row(
         period.duration_s(candidate.t_acq_ticks),
         probability.map_or_else(|| "-".to_owned(), |p| format!("{p:.3}")),
     );
-}
-
-/// A text in which nothing is markup.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            c => escaped.push(c),
-        }
-    }
-    escaped
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_no_markup() {
-        assert_eq!(escaped("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
-    }
 }
