@@ -8,6 +8,7 @@
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
 #[path = "../common/flight.rs"]
+#[allow(dead_code, reason = "others use more of it")]
 mod flight;
 #[path = "../common/server.rs"]
 #[allow(dead_code, reason = "others use more of it")]
@@ -28,7 +29,7 @@ use watchers::Watchers;
 const DOMAIN: u16 = 147;
 const MISSION: &str = "planner = \"heuristic:90\"\n[requests.random]\ncount = [3000, 3000]\n";
 /// Orbits and paces of the two kinds of missions.
-const KINDS: [(&str, &str, &str); 2] = [("lockstep", "15", "0"), ("paced", "1", "300")];
+const KINDS: [(&str, &str, &str); 2] = [("lockstep", "5", "0"), ("paced", "1", "300")];
 /// Who looks: readers of facts, clients of Foxglove, and how many of these are stuck.
 const CROWDS: [(&str, [usize; 3]); 3] =
     [("ten_consoles", [10, 0, 0]), ("fifty_foxglove", [0, 50, 0]), ("fifty_foxglove_one_stuck", [0, 49, 1])];

@@ -2,6 +2,8 @@
 
 pub mod error;
 pub mod fault_orders;
+pub mod health;
+pub mod lifecycle;
 pub mod messages;
 pub mod node;
 pub mod orders;

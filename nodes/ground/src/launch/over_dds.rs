@@ -8,15 +8,19 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
+use swath_node::health::{HEALTH, STATE};
 use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
-use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
+use swath_ros::lifecycle::State;
+use swath_ros::{Environment, Node, RosArgs, Shutdown, Subscription, Value, graph, stamp};
+use swath_sim::task::{FailureReason, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use super::fleet::Fleet;
+use super::kept::{Keeping, KeptFlight};
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use crate::alarms::FlyingBoard;
@@ -29,7 +33,8 @@ use swath_mission::faults::{FaultPlan, What};
 use swath_mission::file::Mission;
 use swath_mission::link::ground::Ground;
 use swath_mission::link::response::LinkSummary;
-use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
+use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs, TaskLine};
+use swath_mission::requests::journal::{Attempt, Outcome as AttemptOutcome};
 use swath_mission::task_log::TaskLog;
 
 use crate::requests::ground_end::GroundEnd;
@@ -49,6 +54,10 @@ const JOURNAL_DELAY: Duration = Duration::from_millis(500);
 const WAIT: Duration = Duration::from_millis(100);
 /// How long nodes that are started again at the very end may take to be there.
 const WHOLE_TIMEOUT: Duration = Duration::from_secs(20);
+/// How often what another launcher must know is kept.
+const KEEP_EVERY: Duration = Duration::from_secs(1);
+/// How long a launcher that takes over waits for nodes to be there.
+const MATCH_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// What there is besides the nodes that fly.
 #[derive(Clone, Copy)]
@@ -70,12 +79,13 @@ pub fn fly(
     wishes: Wishes,
     policies: &Policies,
 ) -> Result<Flown> {
-    let mut launcher = Launcher::start(mission, ros)?;
+    let keeping = Keeping::new(output.make_state_folder()?);
+    let _lock = keeping.lock()?;
+    let mut launcher = Launcher::start(mission, ros, keeping.clone(), wishes.record)?;
     let namespace = launcher.node.names().namespace().to_owned();
     let manifest_data = manifest_data(mission, &namespace, policies);
-    let mut fleet = Fleet::new(&mission.supervision);
-    let record = wishes.record;
-    if record {
+    let mut fleet = Fleet::new(&mission.supervision, keeping);
+    if wishes.record {
         let words = [manifest_data, full_bag(&launcher)].concat();
         start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words)?;
     }
@@ -83,6 +93,36 @@ pub fn fly(
         show(&mut fleet, &mission.name, &namespace, address)?;
     }
     start_nodes(&mut fleet, mission_file, &namespace, output, wishes)?;
+    launcher.keep()?;
+    land(mission, launcher, fleet, output)
+}
+
+/// Takes over a mission whose launcher is gone, and flies it to its end.
+pub fn take_over(mission: &Mission, ros: &RosArgs, output: &mut OutputFolder, flown: &[TaskLine]) -> Result<Flown> {
+    let keeping = Keeping::new(output.make_state_folder()?);
+    let _lock = keeping.lock()?;
+    let kept = keeping.flight()?;
+    let domain = Environment::read()?.domain;
+    if domain != kept.domain {
+        bail!("this mission flies in domain {}, not in {domain}: set ROS_DOMAIN_ID", kept.domain);
+    }
+    let epoch = i64::try_from(kept.epoch + 1)?;
+    let ros = ros.clone().in_namespace(&kept.namespace).with_parameter("epoch", Value::Integer(epoch));
+    let mut launcher = Launcher::start(mission, &ros, keeping.clone(), kept.record)?;
+    launcher.take_up(kept, flown)?;
+    // Nodes tell a launcher that has just come what it must know: it should be there for them. Some may be lost.
+    if let Err(missing) = launcher.node.wait_for_peers(&graph::FLIGHT_NODES, MATCH_TIMEOUT) {
+        tracing::warn!("{missing}");
+    }
+    launcher.catch_up(output)?;
+    let fleet = Fleet::take_over(&mission.supervision, keeping)?;
+    launcher.keep()?;
+    land(mission, launcher, fleet, output)
+}
+
+/// Watches a mission to its end, ends its processes, and tells what came of it.
+fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mut OutputFolder) -> Result<Flown> {
+    let record = launcher.record;
     let nodes = fleet.processes();
     let watched = launcher.watch(&mut fleet, output);
     let Some(flown) = launcher.flown else {
@@ -113,7 +153,7 @@ pub fn fly(
         seed: mission.seed,
         orbits: mission.orbits,
         ticks: flown.end.0,
-        wall_seconds: (flown.last - flown.began).as_secs_f64(),
+        wall_seconds: launcher.flown_before_s + (flown.last - flown.began).as_secs_f64(),
         requests: mission.initial_requests()?.0.len() as u64,
         accepted: launcher.accepted(),
         messages_recorded,
@@ -241,11 +281,36 @@ fn count_messages(bag: &Path) -> Result<u64> {
     Ok(information.message_count)
 }
 
-/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`.
+/// The task of an attempt.
+fn record_of(attempt: &Attempt) -> TaskRecord {
+    let failure = match attempt.outcome {
+        AttemptOutcome::Succeeded => None,
+        AttemptOutcome::Failed(reason) => Some(reason),
+        AttemptOutcome::Cancelled => Some(FailureReason::Interrupted),
+    };
+    let (max_attitude_error, min_elevation) = (attempt.max_attitude_error, attempt.min_elevation);
+    TaskRecord {
+        task: attempt.task,
+        start: attempt.start,
+        end: attempt.end,
+        strip: Some(attempt.id),
+        t_pre: attempt.t_pre,
+        t_acq: attempt.t_acq,
+        outcome: TaskOutcome { failure, max_attitude_error, min_elevation },
+    }
+}
+
+/// Whether a node tells of its health that it does nothing because somebody told it to.
+fn rests(status: &DiagnosticStatus) -> bool {
+    let waits = [State::Unconfigured, State::Inactive].map(State::label);
+    status.name.ends_with(HEALTH) && status.values.iter().any(|it| it.key == STATE && waits.contains(&&*it.value))
+}
+
+/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`. Its health is none.
 fn report(tick: Tick, status: DiagnosticStatus) -> Option<Report> {
     let (node, name) = status.name.split_once(": ")?;
     let (_, node) = node.rsplit_once('/')?;
-    let key = graph::MEMBERS.contains(&node).then(|| Key::new(node, name))?;
+    let key = (graph::MEMBERS.contains(&node) && name != HEALTH).then(|| Key::new(node, name))?;
     let severity = if status.level == DiagnosticStatus::WARN { Severity::Warn } else { Severity::Error };
     Some(Report { tick, key, severity, wrong: status.level != DiagnosticStatus::OK, text: status.message })
 }
@@ -272,6 +337,18 @@ pub(super) struct Launcher {
     pub(super) paced: bool,
     pub(super) stamper: Stamper,
     pub(super) alarms: FlyingBoard,
+    /// When a node was last heard to rest because somebody told it to.
+    pub(super) resting: Option<Instant>,
+    keeping: Keeping,
+    /// When what is known of the flight was kept last.
+    kept_at: Option<Instant>,
+    /// Launchers before this one, and how long they flew [s of wall time].
+    epoch: u64,
+    flown_before_s: f64,
+    /// Whether a bag is recorded.
+    record: bool,
+    /// What was ordered up to this tick has befallen the recorder before this launcher.
+    pub(super) recorder_since: Tick,
     /// When something happened to alarms that is not in the journal's file yet.
     pub(super) unwritten: Option<Instant>,
     /// What is ordered to befall the mission.
@@ -297,7 +374,7 @@ pub(super) struct Reached {
 }
 
 impl Launcher {
-    fn start(mission: &Mission, ros: &RosArgs) -> Result<Self> {
+    fn start(mission: &Mission, ros: &RosArgs, keeping: Keeping, record: bool) -> Result<Self> {
         let node = Node::start(graph::LAUNCHER, ros)?;
         let model = mission.model()?;
         let stamper = Stamper::new(mission.epoch_unix_s, model.period);
@@ -318,6 +395,13 @@ impl Launcher {
             last_summary: None,
             paced: mission.pace > 0.0,
             alarms: FlyingBoard::new(&node, model.period, stamper.clone(), planned)?,
+            resting: None,
+            keeping,
+            kept_at: None,
+            epoch: 0,
+            flown_before_s: 0.0,
+            record,
+            recorder_since: Tick(0),
             unwritten: None,
             stamper,
             faults: mission.faults.clone(),
@@ -329,6 +413,50 @@ impl Launcher {
             room_since: None,
             model,
             node,
+        })
+    }
+
+    /// Goes on where the launcher before was.
+    fn take_up(&mut self, kept: KeptFlight, flown: &[TaskLine]) -> Result<()> {
+        self.recorder_since = kept.at;
+        self.recorder_faults.retain(|(it, _)| it.from > kept.at);
+        self.alarms.take_up(kept.reports, kept.wishes)?;
+        (self.epoch, self.flown_before_s) = (kept.epoch + 1, kept.flown_s);
+        (self.decided, self.deciders, self.safe_mode) = (kept.decided, kept.deciders, kept.safe_mode);
+        self.log = TaskLog::going_on(flown);
+        let now = Instant::now();
+        let end = Tick(flown.iter().map(|line| line.end_tick).max().unwrap_or(0));
+        self.flown = Some(Reached { end, began: now, last: now });
+        Ok(())
+    }
+
+    /// Learns from the store what was imaged while there was no launcher.
+    fn catch_up(&mut self, output: &mut OutputFolder) -> Result<()> {
+        let store = Store::open_read_only(&output.path().join(STORE))?;
+        for (attempt, name) in store.attempts_from(self.log.next())? {
+            self.log.flown(record_of(&attempt), &name);
+            self.log.settled(attempt.task, attempt.reward);
+        }
+        self.take_rest(output)
+    }
+
+    /// Keeps what another launcher must know.
+    fn keep(&mut self) -> Result<()> {
+        self.kept_at = Some(Instant::now());
+        let (reports, wishes) = self.alarms.kept();
+        let flown_s = self.flown.map_or(0.0, |flown| (flown.last - flown.began).as_secs_f64());
+        self.keeping.keep_flight(&KeptFlight {
+            epoch: self.epoch,
+            domain: self.node.environment().domain,
+            namespace: self.node.names().namespace().to_owned(),
+            record: self.record,
+            decided: self.decided,
+            deciders: self.deciders.clone(),
+            reports: reports.to_vec(),
+            wishes: wishes.to_vec(),
+            at: self.alarms.now().max(self.recorder_since),
+            safe_mode: self.safe_mode.clone(),
+            flown_s: self.flown_before_s + flown_s,
         })
     }
 
@@ -378,7 +506,12 @@ impl Launcher {
             self.take_rest(output)?;
             self.mind(fleet)?;
             self.mind_alarms(fleet, output)?;
-            if !self.paced && last_news.elapsed() > STALL_TIMEOUT {
+            if self.kept_at.is_none_or(|at| at.elapsed() > KEEP_EVERY) {
+                self.keep()?;
+            }
+            // A mission that somebody made wait has not stalled.
+            let stands = last_news.max(self.resting.unwrap_or(last_news)).elapsed();
+            if !self.paced && stands > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
             }
             self.node.wait(WAIT)?;
@@ -409,6 +542,9 @@ impl Launcher {
             let tick = self.stamper.tick_from(&array.header.stamp);
             for status in array.status {
                 tracing::debug!("{}: {}", status.name, status.message);
+                if rests(&status) {
+                    self.resting = Some(Instant::now());
+                }
                 report(tick, status).into_iter().for_each(|report| self.alarms.report(report));
             }
         }

@@ -35,6 +35,8 @@ pub(super) struct Desk {
     limits: Server<msg::GetLimits>,
     /// Submissions that are being taken, a slice at a time.
     jobs: VecDeque<Job>,
+    /// Whether anything is taken.
+    pub(super) open: bool,
 }
 
 struct Job {
@@ -58,7 +60,13 @@ impl Desk {
             ways: node.server(&graph::LIST_WAYS)?,
             limits: node.server(&graph::GET_LIMITS)?,
             jobs: VecDeque::new(),
+            open: false,
         })
+    }
+
+    /// Whether a call of so many entries is taken.
+    pub(super) fn admit(&self, entries: usize) -> Result<(), Refusal> {
+        if self.open { check_batch(entries) } else { Err(Refusal::Inactive) }
     }
 
     /// Takes the calls that have come. Those that ask without changing anything are answered at once.
@@ -103,7 +111,7 @@ impl Desk {
 
     fn take_changes(&mut self, book: &mut Book, outgoing: &mut Vec<Outgoing>) -> Result<()> {
         while let Some((id, call)) = next(&self.submit)? {
-            match check_batch(call.requests.len()) {
+            match self.admit(call.requests.len()) {
                 Ok(()) => {
                     let requests = call.requests;
                     let results = Vec::with_capacity(requests.len().min(BATCH_MAX));
@@ -124,12 +132,12 @@ impl Desk {
                 let result = book.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
                 messages::submit_result(book.logic(), true, result)
             };
-            let (results, reason_code, reason) = each(&call.ids, cancel);
+            let (results, reason_code, reason) = self.each(&call.ids, cancel);
             outgoing.push(Outgoing::Cancelled(id, msg::CancelStripsResponse { results, reason_code, reason }));
         }
         while let Some((id, call)) = next(&self.replace)? {
             let before = book.logic().len();
-            let result = book.replace(StripId(call.id), order_of(&call.request));
+            let result = self.admit(1).and_then(|()| book.replace(StripId(call.id), order_of(&call.request)));
             let result = messages::submit_result(book.logic(), book.logic().len() == before, result);
             outgoing.push(Outgoing::Replaced(id, msg::ReplaceStripResponse { result }));
         }
@@ -139,7 +147,7 @@ impl Desk {
                 let decided = review.and_then(|review| book.review(StripId(number), review, &call.actor, &call.reason));
                 messages::submit_result(book.logic(), true, decided.map(|()| StripId(number)))
             };
-            let (results, reason_code, reason) = each(&call.ids, decide);
+            let (results, reason_code, reason) = self.each(&call.ids, decide);
             outgoing.push(Outgoing::Reviewed(id, msg::ReviewStripsResponse { results, reason_code, reason }));
         }
         Ok(())
@@ -181,6 +189,18 @@ impl Desk {
             {
                 outgoing.push(Outgoing::Submitted(id, msg::SubmitStripsResponse { results, ..Default::default() }));
             }
+        }
+    }
+
+    /// Does something with each entry of a call: its results, and why the call as a whole is refused.
+    fn each<T>(
+        &self,
+        entries: &[T],
+        apply: impl FnMut(&T) -> msg::SubmitResult,
+    ) -> (Vec<msg::SubmitResult>, u16, String) {
+        match self.admit(entries.len()) {
+            Ok(()) => (entries.iter().map(apply).collect(), 0, String::new()),
+            Err(refusal) => (Vec::new(), refusal.code(), refusal.to_string()),
         }
     }
 
@@ -317,12 +337,4 @@ fn history(base: &MissionNode, store: &Store, call: &msg::ListHistoryRequest) ->
     lines.truncate(limit);
     let entries = lines.iter().map(|line| messages::history_entry(&base.stamper, line)).collect::<Vec<_>>();
     Ok(msg::ListHistoryResponse { entries, more, ..Default::default() })
-}
-
-/// Does something with each entry of a call: its results, and why the call as a whole is refused.
-fn each<T>(entries: &[T], apply: impl FnMut(&T) -> msg::SubmitResult) -> (Vec<msg::SubmitResult>, u16, String) {
-    match check_batch(entries.len()) {
-        Ok(()) => (entries.iter().map(apply).collect(), 0, String::new()),
-        Err(refusal) => (Vec::new(), refusal.code(), refusal.to_string()),
-    }
 }

@@ -58,10 +58,11 @@ impl FlightSide {
         Ok(self.points.take()?)
     }
 
-    /// Answers a question of guidance.
+    /// Answers a question of guidance. One who rests offers nothing; guidance asks again.
     pub(super) fn answer(
         &mut self,
         point: &msg::DecisionPoint,
+        offers: bool,
         logic: &mut RequestLogic,
         base: &MissionNode,
         store: &Store,
@@ -73,7 +74,7 @@ impl FlightSide {
         }
         let offer = self.offer(logic, base, store, point)?;
         outgoing.extend(self.results(logic, point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
-        outgoing.extend(offer.map(|offer| Outgoing::Offer(Box::new(offer))));
+        outgoing.extend(offer.filter(|_| offers).map(|offer| Outgoing::Offer(Box::new(offer))));
         if point.mission_over {
             outgoing.push(Outgoing::Summary);
         }
@@ -116,6 +117,11 @@ impl FlightSide {
             }
         };
         if now < logic.now() && self.last.is_none() {
+            if base.goes_on() {
+                // A reader that comes late is sent what the writer still holds.
+                tracing::debug!("a decision point of {now} is old");
+                return Ok(None);
+            }
             let known = logic.now();
             bail!("store {} is of a flight that is at {known}, this one is at {now}", store.path().display());
         }

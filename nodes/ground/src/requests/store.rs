@@ -419,6 +419,28 @@ impl Store {
         lines.map_err(sql)?.collect::<Result<_, _>>().map_err(sql)
     }
 
+    /// The attempts of tasks from a number on, in order, each with its strip's name.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn attempts_from(&self, task: u64) -> Result<Vec<(Attempt, String)>, StoreError> {
+        let sql = |source| self.error(source);
+        let select = "SELECT DISTINCT request FROM attempts WHERE task >= ?1";
+        let mut statement = self.connection.prepare_cached(select).map_err(sql)?;
+        let ids = statement.query_map([task.cast_signed()], |row| row.get::<_, i64>(0)).map_err(sql)?;
+        let ids: Vec<StripId> =
+            ids.map(|id| id.map(|id| StripId(id.cast_unsigned()))).collect::<Result<_, _>>().map_err(sql)?;
+        let mut found = Vec::new();
+        for id in ids {
+            let name = "SELECT name FROM requests WHERE id = ?1";
+            let name: String = self.connection.query_row(name, [id.0.cast_signed()], |row| row.get(0)).map_err(sql)?;
+            let attempts = self.attempts(id)?.into_iter().filter(|attempt| attempt.task >= task);
+            found.extend(attempts.map(|attempt| (attempt, name.clone())));
+        }
+        found.sort_by_key(|(attempt, _)| attempt.task);
+        Ok(found)
+    }
+
     /// The attempts at a request, in order.
     ///
     /// # Errors

@@ -30,6 +30,7 @@ use swath_mission::orders::order::Order;
 use swath_mission::requests::journal::{Entry, Progress};
 use swath_mission::requests::logic::RequestLogic;
 use swath_mission::requests::refusal::Refusal;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity};
 use swath_node::orders::{operator_action, order_of};
 use swath_node::program::{Parameter, Program};
@@ -55,14 +56,11 @@ const PROGRAM: Program = Program {
 /// # Errors
 /// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = RequestNode::new(MissionNode::start(&PROGRAM)?)?;
-    let outcome = node.fly();
-    let RequestNode { mut writer, reader, .. } = node;
-    // The last connection to close the store leaves one file.
-    drop(reader);
-    // What was taken is written, also when the node ends on an error.
-    writer.finish()?;
-    outcome
+    let base = MissionNode::start(&PROGRAM)?;
+    let spec = Spec::new(STORE.name, String::new(), STORE.about);
+    let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, |base| RequestNode::new(base, path.clone()))
 }
 
 struct RequestNode {
@@ -81,6 +79,8 @@ struct RequestNode {
     writer: Writer,
     /// Whether there was no room, as it was told last.
     full_told: bool,
+    /// Whether there is no room because that was ordered.
+    full_ordered: bool,
     /// When there is no room, by order, and the time; where nothing is ordered, neither.
     full_by_order: Vec<Scheduled>,
     clock: Option<Subscription<Clock>>,
@@ -116,10 +116,7 @@ impl Side {
 }
 
 impl RequestNode {
-    fn new(base: MissionNode) -> Result<Self> {
-        let spec = Spec::new(STORE.name, String::new(), STORE.about);
-        let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
-        base.node.parameters().check_given()?;
+    fn new(base: MissionNode, path: PathBuf) -> Result<Self> {
         let (path, temporary) = if path.as_os_str().is_empty() {
             tracing::warn!("requests do not outlast this process: parameter `store` is not set");
             let folder = tempfile::tempdir().context("cannot make a temporary store")?;
@@ -127,7 +124,7 @@ impl RequestNode {
         } else {
             (path, None)
         };
-        let lock = StoreLock::take(&path, base.node.epoch() > 0)?;
+        let lock = StoreLock::take(&path, base.goes_on())?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
         let book = take_up(&base, &mut store)?;
@@ -143,6 +140,7 @@ impl RequestNode {
             written: book.logic().progress(),
             writer: Writer::start(store, base.node.signal().clone()),
             full_told: false,
+            full_ordered: false,
             full_by_order: Vec::new(),
             clock: None,
             clock_at: Tick(0),
@@ -169,13 +167,6 @@ impl RequestNode {
         Ok(())
     }
 
-    fn fly(&mut self) -> Result<()> {
-        while !self.base.shutdown.asked() {
-            self.turn()?;
-        }
-        Ok(())
-    }
-
     /// What is on the other side of it: questions of guidance and what is answered, or the next tick of the radio.
     fn take_side(&mut self, outgoing: &mut Vec<Outgoing>) -> Result<Option<(Tick, bool)>> {
         self.take_fault_orders()?;
@@ -191,7 +182,8 @@ impl RequestNode {
             self.take_fault_orders()?;
             self.mind_room(Tick(point.tick))?;
             if let (Side::Flight(side), Book::Whole(logic)) = (&mut self.side, &mut self.book) {
-                side.answer(&point, logic, &self.base, &self.reader, outgoing)?;
+                let offers = self.desk.open;
+                side.answer(&point, offers, logic, &self.base, &self.reader, outgoing)?;
             }
         }
         if let (Side::Flight(side), Book::Whole(logic)) = (&self.side, &mut self.book) {
@@ -200,7 +192,7 @@ impl RequestNode {
         Ok(None)
     }
 
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<()> {
         let mut outgoing = Vec::new();
         let sends = self.take_side(&mut outgoing)?;
         self.mind_room(Tick(0))?;
@@ -231,9 +223,11 @@ impl RequestNode {
             return Ok(());
         }
         while let Some(request) = self.requests.take()? {
-            if self.writer.full() {
-                self.base.alarm(Severity::Warn, "request refused", &Refusal::StoreFull.to_string())?;
-            } else if let Err(refusal) = self.book.submit(order_of(&request)) {
+            let taken = match self.writer.full() {
+                true => Err(Refusal::StoreFull),
+                false => self.desk.admit(1).and_then(|()| self.book.submit(order_of(&request))),
+            };
+            if let Err(refusal) = taken {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
@@ -318,7 +312,10 @@ impl RequestNode {
         let ordered = self.full_by_order.iter().any(|it| it.from <= now && now < it.until);
         self.writer.set_full_by_order(ordered);
         let full = self.writer.full();
-        if full != self.full_told && !(full && ordered) {
+        // Room is looked for from time to time: what was ordered may last a little longer.
+        self.full_ordered = full && (ordered || self.full_ordered);
+        let full = full && !self.full_ordered;
+        if full != self.full_told {
             self.full_told = full;
             let text = if full { Refusal::StoreFull.to_string() } else { "there is room".to_owned() };
             let at = self.book.logic().now().max(self.clock_at);
@@ -346,6 +343,39 @@ impl RequestNode {
             }
         }
         Ok(())
+    }
+}
+
+impl LifecycleNode for RequestNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn activate(&mut self) -> Result<()> {
+        self.desk.open = true;
+        Ok(())
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        self.desk.open = false;
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    /// Nothing is taken and nothing offered; what ends is written down, and questions are answered.
+    fn rest(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        let Self { mut writer, reader, base, .. } = self;
+        // The last connection to close the store leaves one file.
+        drop(reader);
+        writer.finish()?;
+        Ok(base)
     }
 }
 

@@ -9,6 +9,7 @@ use swath_mission::link::catalogue::Catalogue;
 use swath_mission::link::radio::Radio;
 use swath_mission::requests::logic::RequestLogic;
 use swath_msgs::swath_msgs as msg;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::messages::upcoming::upcoming_strips;
 use swath_node::node::{MissionNode, Severity};
 use swath_node::program::Program;
@@ -39,11 +40,9 @@ const KEPT: &str = "catalogue.journal";
 /// # Errors
 /// When the node cannot come up, the mission has no `[link]`, what was kept cannot be read, or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = CatalogueNode::new(MissionNode::start(&PROGRAM)?)?;
-    while !node.base.shutdown.asked() {
-        node.turn()?;
-    }
-    Ok(())
+    let base = MissionNode::start(&PROGRAM)?;
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, CatalogueNode::new)
 }
 
 /// What the catalogue takes in: all that it knows follows from it.
@@ -76,12 +75,13 @@ struct CatalogueNode {
     results: Publisher<msg::TaskResult>,
     /// Whether the ground was silent when it was told last.
     silent: bool,
+    /// One who rests offers nothing; guidance asks again.
+    offers: bool,
     base: MissionNode,
 }
 
 impl CatalogueNode {
     fn new(base: MissionNode) -> Result<Self> {
-        base.node.parameters().check_given()?;
         let radio =
             Radio::of(&base.mission, &base.model)?.context("the mission has no [link]: it needs no catalogue")?;
         let requests =
@@ -89,7 +89,7 @@ impl CatalogueNode {
         let catalogue = Catalogue::new(requests, radio.rates().1, radio.config(), base.model.period);
         let (mut journal, mut kept) = (None, Vec::new());
         if let Some(path) = base.keeps(KEPT) {
-            let (opened, before) = Journal::open(&path, base.node.epoch() > 0)?;
+            let (opened, before) = Journal::open(&path, base.goes_on())?;
             (journal, kept) = (Some(opened), before);
         }
         let mut node = Self {
@@ -104,7 +104,8 @@ impl CatalogueNode {
             upcoming: base.node.publisher(&graph::UPCOMING_STRIPS)?,
             results: base.node.publisher(&graph::TASK_RESULTS)?,
             // What the one before has told may be over.
-            silent: base.node.epoch() > 0,
+            silent: base.goes_on(),
+            offers: false,
             base,
         };
         node.take_up(&kept)?;
@@ -130,7 +131,7 @@ impl CatalogueNode {
         Ok(())
     }
 
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<()> {
         while let Some(message) = self.turns.take()? {
             match turn(&message, self.base.horizon) {
                 Ok(turn) if self.logic.awaits_turn(turn.tick) => self.take(Taken::Turn(message))?,
@@ -143,7 +144,9 @@ impl CatalogueNode {
             let last = self.said.offer.as_ref().filter(|last| last.task == message.task && !message.mission_over);
             if let Some(last) = last {
                 // The question again: the answer may have been lost.
-                self.upcoming.publish(last)?;
+                if self.offers {
+                    self.upcoming.publish(last)?;
+                }
             } else if let Err(error) = self.base.tick(message.tick).and_then(|_| messages::point(&message)) {
                 self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?;
             } else if self.logic.awaits_point(message.task) {
@@ -174,7 +177,7 @@ impl CatalogueNode {
             match effect {
                 Effect::Heard(_) => self.heard.publish(self.said.heard.as_ref().context("nothing was heard")?)?,
                 Effect::Sent(..) => self.sent.publish(self.said.sent.as_ref().context("nothing was sent")?)?,
-                Effect::Offer(_) if over => {}
+                Effect::Offer(_) if over || !self.offers => {}
                 Effect::Offer(_) => self.upcoming.publish(self.said.offer.as_ref().context("there is no offer")?)?,
                 Effect::Settled(record, reward) => {
                     result_of(&taken, &record, reward).iter().try_for_each(|result| self.results.publish(result))?;
@@ -227,6 +230,35 @@ impl CatalogueNode {
             return Ok(());
         }
         self.base.condition(&of_ground(now, self.logic.catalogue().heard(), silent))
+    }
+}
+
+impl LifecycleNode for CatalogueNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn activate(&mut self) -> Result<()> {
+        self.offers = true;
+        Ok(())
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        self.offers = false;
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    /// What comes over the radio and what ends is still taken in.
+    fn rest(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        Ok(self.base)
     }
 }
 

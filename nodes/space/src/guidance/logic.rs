@@ -311,8 +311,13 @@ impl GuidanceLogic {
             }
         };
         // Nobody knows any more what would have been commanded there.
-        let idle = || Command { tick, task: self.task, guidance: GuidanceTick::IDLE, has_strip: false, remaining: 0 };
-        (tick < first).then(|| vec![Effect::Command(idle())])
+        (tick < first).then(|| vec![Effect::Command(self.idle(tick))])
+    }
+
+    /// The command that does nothing: the wheels hold no torque.
+    #[must_use]
+    pub fn idle(&self, tick: Tick) -> Command {
+        Command { tick, task: self.task, guidance: GuidanceTick::IDLE, has_strip: false, remaining: 0 }
     }
 
     /// Takes the task wanted.

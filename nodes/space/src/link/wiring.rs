@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use swath_mission::link::channel::Channel;
 use swath_mission::link::radio::{Direction, Radio};
 use swath_msgs::swath_msgs as msg;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::MissionNode;
 use swath_node::program::Program;
 use swath_ros::{Publisher, Subscription, graph};
@@ -34,11 +35,9 @@ const KEPT: &str = "link.journal";
 /// # Errors
 /// When the node cannot come up, the mission has no `[link]`, or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = LinkNode::new(MissionNode::start(&PROGRAM)?)?;
-    while !node.base.shutdown.asked() {
-        node.turn()?;
-    }
-    Ok(())
+    let base = MissionNode::start(&PROGRAM)?;
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, LinkNode::new)
 }
 
 /// What an end has sent, as it is kept.
@@ -63,12 +62,11 @@ struct LinkNode {
 
 impl LinkNode {
     fn new(base: MissionNode) -> Result<Self> {
-        base.node.parameters().check_given()?;
         let radio = Radio::of(&base.mission, &base.model)?.context("the mission has no [link]: it needs no radio")?;
         let mut logic = LinkLogic::new(Channel::new(radio), base.horizon);
         let (mut journal, mut kept) = (None, Vec::new());
         if let Some(path) = base.keeps(KEPT) {
-            let (opened, before) = Journal::open(&path, base.node.epoch() > 0)?;
+            let (opened, before) = Journal::open(&path, base.goes_on())?;
             (journal, kept) = (Some(opened), before);
         }
         for Kept { up, sent } in &kept {
@@ -86,7 +84,7 @@ impl LinkNode {
         })
     }
 
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<()> {
         while let Some(sent) = self.from_satellite.take()? {
             self.take(false, sent)?;
         }
@@ -125,6 +123,32 @@ impl LinkNode {
             topic.publish(&messages::radio_turn(&self.base.stamper, &turn))?;
         }
         Ok(())
+    }
+}
+
+impl LifecycleNode for LinkNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        bail!(
+            "without the radio neither ground nor satellite knows that time passes: a link that drops all is a fault by order"
+        )
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        self.work()
+    }
+
+    /// It has not been activated yet: nobody is told anything.
+    fn rest(&mut self) -> Result<()> {
+        self.base.wait(AGAIN_AFTER)?;
+        Ok(())
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        Ok(self.base)
     }
 }
 

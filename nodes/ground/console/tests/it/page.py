@@ -33,6 +33,14 @@ def at(page, time_ms):
     return int(page.locator('input[type="range"]').input_value())
 
 
+def follows(page, key):
+    """Whether the row that a key selects is seen in the table."""
+    page.keyboard.press(key)
+    page.wait_for_timeout(200)
+    row, table = page.locator(".row.selected").bounding_box(), page.locator(".table").bounding_box()
+    return row["y"] > table["y"] and row["y"] + row["height"] <= table["y"] + table["height"] + 1
+
+
 def look(page, saw):
     page.goto(URL)
     page.wait_for_selector(".rows .row", timeout=60000)
@@ -55,6 +63,7 @@ def look(page, saw):
     page.keyboard.press("ArrowDown")
     saw["drawer"] = page.locator(".drawer tbody tr").count()
     saw["selected"] = page.locator(".row.selected").count()
+    saw["followed"] = all(follows(page, key) for key in ["End", "PageUp", "ArrowUp", "Home", "PageDown", "ArrowDown"])
     page.get_by_role("button", name="globe").click()
     page.wait_for_timeout(500)
     page.screenshot(path=FOLDER / "globe.png")

@@ -49,7 +49,7 @@ fn the_page_shows_what_the_facts_say() {
     }
     assert_eq!(saw["completed"], shown[0][1]["completed"]);
     // By keyboard: one strip is selected, and its history is told.
-    assert_eq!(saw["selected"], 1);
+    assert_eq!((&saw["selected"], &saw["followed"]), (&serde_json::json!(1), &serde_json::json!(true)));
     assert!(saw["drawer"].as_u64().unwrap() >= 4, "{saw}");
     assert!(saw["candidates"].as_u64().unwrap() > 0, "{saw}");
 }

@@ -90,6 +90,13 @@ function Locked() {
   );
 }
 
+/** Opens a panel; what was said in another one is over. */
+function open(name: string): void {
+  if (name === panel.value) return;
+  panel.value = name;
+  message.value = "";
+}
+
 function App() {
   if (locked.value) return <Locked />;
   const panels = PANELS.filter((it) => info.value.commands || !it.commands);
@@ -102,7 +109,7 @@ function App() {
         <section class="side">
           <nav role="tablist">
             {panels.map(({ name }) => (
-              <button key={name} role="tab" aria-selected={panel.value === name} onClick={() => (panel.value = name)}>{name}</button>
+              <button key={name} role="tab" aria-selected={panel.value === name} onClick={() => open(name)}>{name}</button>
             ))}
           </nav>
           {message.value && (

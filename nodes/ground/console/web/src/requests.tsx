@@ -11,6 +11,8 @@ import type { ChangeFact } from "./facts";
 import type { Strip } from "./world";
 
 const ROW = 24;
+/** Keys that go through the table, and how many rows each. */
+const STEPS: Record<string, number> = { ArrowDown: 1, ArrowUp: -1, PageDown: 20, PageUp: -20, End: Infinity, Home: -Infinity };
 /** Rows drawn above and below what is seen. */
 const SPARE = 10;
 
@@ -92,7 +94,7 @@ function Filters() {
       <label>
         <input type="checkbox" checked={onlyInView.value} onChange={(event) => (onlyInView.value = event.currentTarget.checked)} /> in map view
       </label>
-      <span>{rows.value.length}</span>
+      <span title="requests that are shown">{rows.value.length}</span>
     </div>
   );
 }
@@ -126,12 +128,16 @@ function Table() {
   const all = rows.value;
   const first = Math.max(0, Math.floor(top / ROW) - SPARE);
   const part = all.slice(first, first + Math.ceil(height / ROW) + 2 * SPARE);
-  const step = (by: number, more: boolean) => {
+  const step = (table: HTMLElement, by: number, more: boolean) => {
     const at = all.findIndex(({ strip }) => strip.id === focus.value);
-    const next = all[Math.max(0, Math.min(all.length - 1, at + by))];
+    const to = Math.max(0, Math.min(all.length - 1, at + by));
+    const next = all[to];
     if (!next) return;
     select(next.strip.id, more);
     reveal(next.strip);
+    // The head stays above the rows.
+    const room = table.clientHeight - ROW;
+    table.scrollTop = Math.min(to * ROW, Math.max(table.scrollTop, (to + 1) * ROW - room));
   };
   return (
     <div
@@ -145,8 +151,8 @@ function Table() {
         setHeight(event.currentTarget.clientHeight);
       }}
       onKeyDown={(event) => {
-        if (event.key === "ArrowDown") step(1, event.shiftKey);
-        else if (event.key === "ArrowUp") step(-1, event.shiftKey);
+        const by = STEPS[event.key];
+        if (by) step(event.currentTarget, by, event.shiftKey);
         else if (event.key === "a" && event.ctrlKey) selected.value = new Set(all.map(({ strip }) => strip.id));
         else return;
         event.preventDefault();
