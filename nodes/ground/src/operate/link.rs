@@ -124,7 +124,7 @@ impl Outlook {
         let now = || Some((link.tick, link.header.stamp));
         // The next pass from a tick on, or the tick itself where the radio is always open.
         let pass = |tick: u64, at: &Time| match link.passes.as_slice() {
-            [] => link.open.then(|| (tick, *at)),
+            [] => link.open.then_some((tick, *at)),
             passes => passes.iter().find(|pass| pass.set_tick > tick).map(|pass| match pass.rise_tick > tick {
                 true => (pass.rise_tick, pass.rise),
                 false => (tick, *at),
