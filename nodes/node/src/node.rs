@@ -17,8 +17,8 @@ use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
-use crate::fault_orders::FaultOrders;
 use crate::health::{HEALTH, Health, Known};
+use crate::orders_heard::FaultOrders;
 use crate::out;
 use crate::program::{AUTOSTART, MISSION, Program};
 use crate::stamp::Stamper;
