@@ -14,6 +14,7 @@ const PROGRAMS: &[&str] = &[
     "swath",
     "swath-bag",
     "swath-catalogue",
+    "swath-console",
     "swath-guidance",
     "swath-link",
     "swath-planner",

@@ -17,7 +17,7 @@ const OUTPUTS: [&str; 3] = ["tasks.jsonl", "strips.jsonl", "alarms.jsonl"];
 
 fn mission(folder: &Path, name: &str, text: &str) -> PathBuf {
     let path = folder.join(format!("{name}.toml"));
-    std::fs::write(&path, format!("[requests.random]\ncount = [800, 800]\n{text}")).unwrap();
+    std::fs::write(&path, format!("{text}[requests.random]\ncount = [800, 800]\n")).unwrap();
     path
 }
 

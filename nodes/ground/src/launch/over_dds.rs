@@ -221,13 +221,8 @@ fn full_bag(launcher: &Launcher) -> Vec<String> {
 
 /// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
 fn show(fleet: &mut Fleet, title: &str, namespace: &str, address: SocketAddr) -> Result<()> {
-    let words = [
-        "console".to_owned(),
-        format!("--listen={address}"),
-        format!("--title={title}"),
-        format!("--namespace={namespace}"),
-    ];
-    fleet.start_beside(graph::CONSOLE, "swath", &words)?;
+    let words = [format!("--listen={address}"), format!("--title={title}"), format!("--namespace={namespace}")];
+    fleet.start_beside(graph::CONSOLE, "swath-console", &words)?;
     out::say(format_args!("console: {}", fleet.wait_for_line(graph::CONSOLE, START_TIMEOUT)?));
     Ok(())
 }

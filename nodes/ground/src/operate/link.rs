@@ -121,21 +121,21 @@ pub struct Outlook {
 impl Outlook {
     /// From how the radio stands, and the chances of the strip.
     pub fn new(link: &msg::LinkStatus, opportunities: &[msg::Opportunity]) -> Self {
-        let now = || Some((link.tick, link.header.stamp.clone()));
+        let now = || Some((link.tick, link.header.stamp));
         // The next pass from a tick on, or the tick itself where the radio is always open.
         let pass = |tick: u64, at: &Time| match link.passes.as_slice() {
-            [] => link.open.then(|| (tick, at.clone())),
+            [] => link.open.then_some((tick, *at)),
             passes => passes.iter().find(|pass| pass.set_tick > tick).map(|pass| match pass.rise_tick > tick {
-                true => (pass.rise_tick, pass.rise.clone()),
-                false => (tick, at.clone()),
+                true => (pass.rise_tick, pass.rise),
+                false => (tick, *at),
             }),
         };
         let uplink = now().and_then(|(tick, at)| pass(tick, &at));
         let imaged = uplink.as_ref().and_then(|(up, at)| {
             let chance = opportunities.iter().find(|it| it.window_close_tick > *up)?;
             Some(match chance.window_open_tick > *up {
-                true => (chance.window_open_tick, chance.window_open.clone()),
-                false => (*up, at.clone()),
+                true => (chance.window_open_tick, chance.window_open),
+                false => (*up, *at),
             })
         });
         let known = imaged.as_ref().and_then(|(tick, at)| pass(*tick, at));

@@ -95,15 +95,15 @@ struct RequestNode {
 
 /// Who is on the other side: guidance and planner themselves, or a radio.
 enum Side {
-    Flight(FlightSide),
-    Radio(RadioSide),
+    Flight(Box<FlightSide>),
+    Radio(Box<RadioSide>),
 }
 
 impl Side {
     fn new(base: &MissionNode) -> Result<Self> {
         match base.mission.link {
-            None => FlightSide::new(base).map(Self::Flight),
-            Some(_) => RadioSide::new(base).map(Self::Radio),
+            None => Ok(Self::Flight(Box::new(FlightSide::new(base)?))),
+            Some(_) => Ok(Self::Radio(Box::new(RadioSide::new(base)?))),
         }
     }
 
