@@ -8,7 +8,8 @@ use swath_msgs::rosbag2_interfaces::{
     IsPaused, IsPausedResponse, Pause, Resume, Snapshot, SnapshotResponse, SplitBagfile, Stop, TogglePaused,
 };
 use swath_msgs::std_msgs::Header;
-use swath_ros::{Node, Publisher, RosError, Server, graph};
+use swath_ros::lifecycle::State;
+use swath_ros::{Managed, Node, Publisher, RosError, Server, graph};
 
 use crate::error::{Result, chain};
 use crate::writer::{BagSummary, BagWriter};
@@ -37,10 +38,18 @@ pub(super) struct Control {
     diagnostics: Publisher<DiagnosticArray>,
     name: String,
     reported: Option<(Instant, u64)>,
+    lifecycle: Managed,
+    /// Asked for by service.
+    paused: bool,
 }
 
 impl Control {
-    pub(super) fn new(node: &Node) -> Result<Self, RosError> {
+    /// A recorder that is active; `paused` is whether it waits for `~/resume` nevertheless.
+    pub(super) fn new(node: &Node, paused: bool) -> Result<Self, RosError> {
+        let lifecycle = node.managed()?;
+        for label in ["configure", "activate"] {
+            lifecycle.take(label, |_| true)?;
+        }
         Ok(Self {
             pause: node.server(&graph::Service::new("~/pause", &[], &[]))?,
             resume: node.server(&graph::Service::new("~/resume", &[], &[]))?,
@@ -52,20 +61,31 @@ impl Control {
             diagnostics: node.publisher(&graph::DIAGNOSTICS)?,
             name: node.names().fully_qualified(),
             reported: None,
+            lifecycle,
+            paused,
         })
     }
 
     /// Answers the calls that have come.
-    pub(super) fn wishes(&self, paused: bool) -> Result<Wishes, RosError> {
+    pub(super) fn wishes(&mut self) -> Result<Wishes, RosError> {
+        self.lifecycle.serve(|transition| {
+            // A bag that is closed is whole: what comes later belongs into another one.
+            let possible = transition.goal != State::CleaningUp;
+            if !possible {
+                tracing::warn!("{} is refused: a recorder writes one bag", transition.label);
+            }
+            possible
+        })?;
+        let state = self.lifecycle.state();
+        self.paused |= self.pause.answer_all(|_| Default::default())? > 0;
+        self.paused &= self.resume.answer_all(|_| Default::default())? == 0;
+        self.paused ^= self.toggle.answer_all(|_| Default::default())? % 2 == 1;
+        let paused = self.paused || state != State::Active;
         let mut wishes = Wishes { paused, ..Wishes::default() };
-        wishes.paused |= self.pause.answer_all(|_| Default::default())? > 0;
-        wishes.paused &= self.resume.answer_all(|_| Default::default())? == 0;
-        wishes.paused ^= self.toggle.answer_all(|_| Default::default())? % 2 == 1;
-        let paused = wishes.paused;
         self.is_paused.answer_all(|_| IsPausedResponse { paused })?;
         wishes.split = self.split.answer_all(|_| Default::default())? > 0;
         wishes.snapshot = self.snapshot.answer_all(|_| SnapshotResponse { success: true })? > 0;
-        wishes.stop = self.stop.answer_all(|_| Default::default())? > 0;
+        wishes.stop = self.stop.answer_all(|_| Default::default())? > 0 || state == State::Finalized;
         Ok(wishes)
     }
 

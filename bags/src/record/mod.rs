@@ -65,7 +65,7 @@ impl Recorder {
         let mut sink = BagSink::new(writer);
         sink.paused = options.paused;
         let node = Node::start(graph::RECORDER, args)?;
-        let control = Control::new(&node)?;
+        let control = Control::new(&node, options.paused)?;
         let tap = Tap::new(node, options.selection)?;
         Ok(Self { control, tap, sink, chores_at: Instant::now(), resumed })
     }
@@ -120,7 +120,7 @@ impl Recorder {
         self.chores_at = Instant::now();
         self.tap.do_chores(&mut self.sink)?;
         self.tap.node().clock().set_ns(self.tap.now().unwrap_or(0));
-        let wishes = self.control.wishes(self.sink.paused)?;
+        let wishes = self.control.wishes()?;
         self.follow(&wishes);
         let topics = self.tap.topics().count();
         self.control.report(self.sink.writer(), topics, self.tap.node().clock().stamp())?;

@@ -9,7 +9,7 @@ use swath_msgs::std_msgs::Header;
 use swath_msgs::swath_msgs::{
     Decision, DecisionPoint, SpacecraftState, StripStatus, SubmitStrips, SubmitStripsRequest, TaskResult, WheelTorque,
 };
-use swath_msgs::{Interface, RosMessage, RosService, rcl_interfaces, schema_for, type_hash_for};
+use swath_msgs::{Interface, RosMessage, RosService, lifecycle_msgs, rcl_interfaces, schema_for, type_hash_for};
 
 fn cdr(message: &impl Serialize) -> Vec<u8> {
     to_vec::<_, byteorder::LittleEndian>(message).unwrap()
@@ -38,6 +38,12 @@ fn type_hashes_are_those_of_ros_2() {
         ("sensor_msgs/msg/NavSatFix", "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"),
         ("sensor_msgs/msg/JointState", "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"),
         ("diagnostic_msgs/msg/DiagnosticArray", "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"),
+        ("lifecycle_msgs/msg/State", "dd2d02b82f3ebc858e53c431b1e6e91f3ffc71436fc81d0715214ac6ee2107a0"),
+        ("lifecycle_msgs/msg/TransitionEvent", "d5f8873a2f0146498f812d7885c7327ce27e463d36811d8792f35ee38c0d6c38"),
+        (
+            "lifecycle_msgs/msg/TransitionDescription",
+            "c5f1cd4bb1ad2ba0e3329d4ac7015c52a674a72c1faf7974c37a33f4f6048b28",
+        ),
         // Ours, as PyPI `rosbags` computes them from the same files.
         ("swath_msgs/msg/SpacecraftState", "16783b07aaee856ca0c4713fb390a58816887ca775c80800644e7d6539b6fee4"),
         ("swath_msgs/msg/WheelTorque", "7fe6a49598a7850b3e16f4f679a54ff8c430bddf50c8b4d4dcb8894f6a57d034"),
@@ -48,6 +54,12 @@ fn type_hashes_are_those_of_ros_2() {
         ("swath_msgs/msg/StandingAlarms", "73fcc18a42bdcf338356ef212b5d62b8a7bbc7687c52759ecc5c2a2ded7e6079"),
         ("swath_msgs/msg/AlarmEvent", "34c0791c3ef9652609ec8b24ed54fe5cda353bbc0411eb92cc67edb5d80601ba"),
         ("swath_msgs/msg/UpcomingStrips", "85f1f6c705dd469a2336343601f3c88e50235420c6d1857e61fa7d695185ed23"),
+        ("swath_msgs/msg/RadioTurn", "0d5ae29134beb6cca4c232ec639711d9c75f5b7c9f4cd5e338a61bb536422d0e"),
+        ("swath_msgs/msg/RadioSent", "e50156d72018b015195c9a477934b47981b1d37db532dc2571e933d4518f1829"),
+        ("swath_msgs/msg/CatalogueHeard", "c65b2c6553479c4c9a2f76cbf73a55ca122911fb83e26deeac5d0a3bb20b78d2"),
+        ("swath_msgs/msg/GuidanceReached", "c8d07605150eb9370beaeb5485879bf9a913b7efc0ec53d0a23883df4ab10dd9"),
+        ("swath_msgs/msg/LinkStatus", "13dd719b2832603116f9dfc6e4be46de48c1f6400cbfc463ca43c241425356d4"),
+        ("swath_msgs/msg/StripWay", "f9e517e537390d35fc1d46ad9a4b77c3541255f0d3f0de65e29a4c80f03202f8"),
     ] {
         assert_eq!(type_hash_for(type_name), Some(format!("RIHS01_{hash}").as_str()), "{type_name}");
     }
@@ -58,6 +70,14 @@ fn type_hashes_are_those_of_ros_2() {
     assert_eq!(
         rcl_interfaces::SetParameters::TYPE_HASH,
         "RIHS01_56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0"
+    );
+    assert_eq!(
+        lifecycle_msgs::ChangeState::TYPE_HASH,
+        "RIHS01_356fe34f0475a43acf54542013af4167b0e729f77ea22ffb045c6ad8e20668e5"
+    );
+    assert_eq!(
+        lifecycle_msgs::GetAvailableTransitions::TYPE_HASH,
+        "RIHS01_59b7ecefce0982a8a844b9f2c4f14764c1c4543cc55e72924e2aa4adad83e9bc"
     );
 }
 

@@ -17,6 +17,12 @@ pub fn has_operator(seed: u64) -> bool {
     seed % 2 == 1
 }
 
+/// Whether its recording has no gap.
+pub fn is_recorded(mission: &Mission) -> bool {
+    let gap = |fault: &PlannedFault| matches!(fault.what, What::Process(Process::Recorder, _) | What::BagFull);
+    !mission.faults.plan.iter().any(gap)
+}
+
 /// The file of a seed's mission, and its faults.
 pub fn over_dds(seed: u64) -> Result<(String, Vec<PlannedFault>)> {
     let planner = ["lookahead", "heuristic:90", "beam"][(seed / 2 % 3) as usize];

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use swath_sim::mission::Delivered;
-use swath_sim::task::{FailureReason, SettledTask, Totals};
-use swath_sim::time::TickPeriod;
+use swath_sim::task::{FailureReason, SettledTask, TaskOutcome, TaskRecord, Totals};
+use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::world::strip::StripId;
 
 use crate::fallback::Deciders;
 use crate::link::response::LinkSummary;
@@ -59,6 +60,26 @@ impl TaskLine {
             min_elevation_deg: record.outcome.min_elevation.to_degrees(),
             reward: settled.reward,
         }
+    }
+
+    /// The task that the line tells of.
+    #[must_use]
+    pub fn settled(&self) -> SettledTask {
+        let outcome = TaskOutcome {
+            failure: self.reason,
+            max_attitude_error: self.max_attitude_error,
+            min_elevation: self.min_elevation_deg.to_radians(),
+        };
+        let record = TaskRecord {
+            task: self.task,
+            start: Tick(self.start_tick),
+            end: Tick(self.end_tick),
+            strip: self.strip.map(StripId),
+            t_pre: self.t_pre_ticks,
+            t_acq: self.t_acq_ticks,
+            outcome,
+        };
+        SettledTask { record, reward: self.reward }
     }
 }
 

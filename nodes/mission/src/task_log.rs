@@ -21,6 +21,23 @@ pub struct TaskLog {
 }
 
 impl TaskLog {
+    /// A log that goes on after the tasks whose lines are written.
+    #[must_use]
+    pub fn going_on(lines: &[TaskLine]) -> Self {
+        let mut log = Self::default();
+        for line in lines {
+            log.totals.add(&line.settled());
+            log.next = log.next.max(line.task + 1);
+        }
+        log
+    }
+
+    /// Number of the next task.
+    #[must_use]
+    pub fn next(&self) -> u64 {
+        self.next
+    }
+
     /// A task has ended; `name` is its strip's.
     pub fn flown(&mut self, record: TaskRecord, name: &str) {
         if record.task < self.next {

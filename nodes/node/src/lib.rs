@@ -2,9 +2,12 @@
 
 pub mod error;
 pub mod fault_orders;
+pub mod health;
+pub mod lifecycle;
 pub mod messages;
 pub mod node;
 pub mod orders;
+mod orders_heard;
 pub mod out;
 pub mod program;
 pub mod stamp;

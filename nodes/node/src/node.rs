@@ -1,23 +1,26 @@
 //! What every node of a mission starts with: its ROS node, its mission, its alarms.
 
+use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Duration;
+use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use swath_ros::{Dropping, Node, Publisher, RosArgs, Shutdown, Spec, graph};
+use swath_ros::{Dropping, Managed, Node, Publisher, RosArgs, Shutdown, Spec, graph};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
-use crate::fault_orders::FaultOrders;
+use crate::health::{HEALTH, Health, Known};
+use crate::orders_heard::FaultOrders;
 use crate::out;
-use crate::program::{MISSION, Program};
+use crate::program::{AUTOSTART, MISSION, Program};
 use crate::stamp::Stamper;
 use swath_mission::alarms;
 use swath_mission::alarms::conditions::Report;
@@ -40,7 +43,19 @@ pub struct MissionNode {
     pub horizon: Tick,
     /// Stamps of its ticks.
     pub stamper: Stamper,
+    /// Where it stands in its life.
+    pub lifecycle: Rc<Managed>,
+    /// Whether it is configured and activated by itself.
+    pub autostart: bool,
+    /// Whether it was configured before in this process.
+    again: Cell<bool>,
     diagnostics: Publisher<DiagnosticArray>,
+    health: Mutex<Health>,
+    /// Who is missing, as it was told last; nothing once everybody was there.
+    missing: RefCell<Option<Vec<String>>>,
+    /// What was told of alarms, for another launcher, and to how many that was told.
+    told: RefCell<VecDeque<DiagnosticArray>>,
+    told_to: Cell<u64>,
     keep: Option<PathBuf>,
     /// What is ordered to befall this node, the next first, and how often something has already.
     ordered: VecDeque<(Scheduled, Failure)>,
@@ -49,6 +64,9 @@ pub struct MissionNode {
     process: Option<Process>,
     pub(crate) fault_orders: FaultOrders,
 }
+
+/// So much of what was told of alarms is told again to a launcher that takes over.
+const TOLD: usize = 1000;
 
 /// How grave an alarm is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,10 +97,10 @@ impl MissionNode {
             bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
         }
         let mission = Mission::read(&path)?;
-        if mission.link.is_some() {
-            bail!("a mission with [link] flies in one process only: swath launch {} --in-process", path.display());
-        }
         let model = Arc::new(mission.model()?);
+        let autostart = Spec::new(AUTOSTART.name, true, AUTOSTART.about).read_only();
+        let autostart = node.parameters().declare(autostart)?;
+        let lifecycle = Rc::new(node.managed()?);
         let keep =
             Spec::new("keep", String::new(), "Folder for what the node needs to go on when it is started again.");
         let keep = PathBuf::from(node.parameters().declare(keep.read_only())?);
@@ -90,13 +108,21 @@ impl MissionNode {
         let struck = node.parameters().declare(struck.in_range(0.0..=1e6).read_only())?.unsigned_abs();
         let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
         let fault_orders = FaultOrders::new(&node, name, mission.tells_truth_apart(model.period))?;
+        let health = Mutex::new(Health::new(Instant::now(), tick_of(&mission, &model)));
         let mut base = Self {
             shutdown,
             horizon: mission.horizon(&model),
             stamper: Stamper::new(mission.epoch_unix_s, model.period).in_namespace(node.names().namespace()),
             model,
             mission,
+            lifecycle,
+            autostart,
+            again: Cell::new(false),
             diagnostics,
+            health,
+            missing: RefCell::new(Some(Vec::new())),
+            told: RefCell::default(),
+            told_to: Cell::new(0),
             keep: (!keep.as_os_str().is_empty()).then_some(keep),
             ordered: VecDeque::new(),
             struck,
@@ -129,12 +155,29 @@ impl MissionNode {
         self.keep.as_ref().map(|folder| folder.join(name))
     }
 
+    /// Whether there is a place for what it needs to go on.
+    #[must_use]
+    pub fn keeps_something(&self) -> bool {
+        self.keep.is_some()
+    }
+
+    /// From now on this node goes on where it was when it is configured again.
+    pub fn goes_on_from_here(&self) {
+        self.again.set(true);
+    }
+
+    /// Whether this node goes on where it was before, in this process or in one before it.
+    #[must_use]
+    pub fn goes_on(&self) -> bool {
+        self.node.epoch() > 0 || self.again.get()
+    }
+
     /// What this node kept in a file before it was started again; nothing if this is its first start.
     ///
     /// # Errors
     /// When the file is there and cannot be read.
     pub fn kept(&self, name: &str) -> Result<Option<String>> {
-        let Some(path) = self.keeps(name).filter(|path| self.node.epoch() > 0 && path.exists()) else {
+        let Some(path) = self.keeps(name).filter(|path| self.goes_on() && path.exists()) else {
             return Ok(None);
         };
         std::fs::read_to_string(&path).map(Some).with_context(|| format!("cannot read {}", path.display()))
@@ -160,6 +203,9 @@ impl MissionNode {
     /// The fault that befell this node last, if it was started again because of one.
     #[must_use]
     pub fn struck(&self) -> Option<Scheduled> {
+        if self.again.get() {
+            return None;
+        }
         let last = usize::try_from(self.struck.checked_sub(1)?).ok()?;
         self.mission.faults.of(self.process?, self.model.period).get(last).map(|(it, _)| *it)
     }
@@ -169,10 +215,71 @@ impl MissionNode {
     /// # Errors
     /// When the node may not go on, or an alarm cannot be sent.
     pub fn wait(&self, timeout: Duration) -> Result<bool> {
+        self.tell_of_itself()?;
+        Ok(self.node.wait(timeout)?)
+    }
+
+    /// Tells what is due of its health and of the messages of others; for those who wait in another way.
+    ///
+    /// # Errors
+    /// When it cannot be sent.
+    pub fn tell_of_itself(&self) -> Result<()> {
+        if self.told_to.replace(self.node.taken_over()) != self.node.taken_over() {
+            self.told.borrow().iter().try_for_each(|array| self.diagnostics.publish(array))?;
+        }
         for notice in self.node.notices() {
             self.alarm(Severity::Warn, notice.trouble.name(), &notice.to_string())?;
+            self.health().count_more(notice.trouble.name(), notice.count);
         }
-        Ok(self.node.wait(timeout)?)
+        self.tell_health()
+    }
+
+    /// Something that this node's health tells of went wrong so often since it was started.
+    pub fn count(&self, what: &'static str, total: u64) {
+        self.health().count(what, total);
+    }
+
+    fn health(&self) -> MutexGuard<'_, Health> {
+        self.health.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Says for whom this node waits, when that has changed, until everybody was there once.
+    pub fn tell_missing(&self, missing: Vec<String>) {
+        let mut told = self.missing.borrow_mut();
+        let Some(before) = told.as_mut() else { return };
+        if missing.is_empty() {
+            *told = None;
+        } else if *before != missing {
+            tracing::info!("waits: {}", missing.join(", "));
+            *before = missing;
+        }
+    }
+
+    /// The other nodes that fly, as far as this one sees them. Time's own node knows best for whom it waits.
+    fn look_around(&self) {
+        let name = self.node.names().name();
+        if name != graph::SPACECRAFT && self.missing.borrow().is_some() {
+            let others: Vec<&str> = graph::FLIGHT_NODES.into_iter().filter(|it| *it != name).collect();
+            self.tell_missing(self.node.missing_peers(&others));
+        }
+    }
+
+    fn tell_health(&self) -> Result<()> {
+        let mut health = self.health();
+        let now = Instant::now();
+        if !health.turn(now) {
+            return Ok(());
+        }
+        self.look_around();
+        let node = &self.node;
+        let known = Known {
+            now_ns: node.clock().now_ns(),
+            state: self.lifecycle.state(),
+            restarts: node.epoch(),
+            orphaned: node.orphaned(),
+            inputs: node.inputs(),
+        };
+        self.publish(node.clock().stamp(), HEALTH, health.tell(now, &known))
     }
 
     /// A tick of this mission.
@@ -229,18 +336,35 @@ impl MissionNode {
     }
 
     fn diagnose(&self, stamp: Time, level: u8, name: &str, text: &str) -> Result<()> {
+        self.publish(stamp, name, DiagnosticStatus { level, message: text.to_owned(), ..DiagnosticStatus::default() })
+    }
+
+    fn publish(&self, stamp: Time, name: &str, status: DiagnosticStatus) -> Result<()> {
         let status = DiagnosticStatus {
-            level,
             name: format!("{}: {name}", self.node.names().fully_qualified()),
-            message: text.to_owned(),
             hardware_id: "swath".to_owned(),
-            ..DiagnosticStatus::default()
+            ..status
         };
         let mut array = DiagnosticArray::default();
         array.header.stamp = stamp;
+        let is_alarm = name != HEALTH;
         array.status.push(status);
-        self.diagnostics.publish(&array).context("cannot raise an alarm")
+        self.diagnostics.publish(&array).context("cannot raise an alarm")?;
+        if is_alarm {
+            let mut told = self.told.borrow_mut();
+            if told.len() == TOLD {
+                told.pop_front();
+            }
+            told.push_back(array);
+        }
+        Ok(())
     }
+}
+
+/// How long a tick takes at the mission's pace; nothing in lockstep.
+fn tick_of(mission: &Mission, model: &Model) -> Duration {
+    let seconds = if mission.pace > 0.0 { model.period.seconds() / mission.pace } else { 0.0 };
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }
 
 /// Keeps a text in a file, whole or not at all.

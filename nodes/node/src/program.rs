@@ -32,6 +32,12 @@ pub const PACE: Parameter = Parameter {
     about: "0: lockstep; 1: real time; x: x times real time; as the mission says without it.",
 };
 
+/// Whether a node works at once.
+pub const AUTOSTART: Parameter = Parameter {
+    name: "autostart",
+    about: "Whether the node is configured and activated by itself; if not, by its life cycle's services.",
+};
+
 /// What every node of a mission takes; [`MISSION`] must be given.
 const COMMON: &[Parameter] = &[
     MISSION,
@@ -40,8 +46,10 @@ const COMMON: &[Parameter] = &[
     Parameter { name: "external", about: "Nodes whose place another program takes: a list of names." },
     Parameter { name: "keep", about: "Folder for what the node needs to go on when it is started again." },
     Parameter { name: "orphaned_s", about: "How long it goes on without its launcher [s]; 0: there is none." },
+    Parameter { name: "signs", about: "Where a launcher listens that takes the node over; empty: nowhere." },
     Parameter { name: "struck", about: "Faults ordered for this node that have befallen it already." },
     Parameter { name: "memory_limit_mb", about: "Memory that the process may have [10^6 B]; 0 without bound." },
+    AUTOSTART,
     Parameter {
         name: "packet_filter",
         about: "Whether the kernel drops datagrams that would end or fill the process.",

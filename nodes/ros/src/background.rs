@@ -16,6 +16,7 @@ use crate::dds::Dds;
 use crate::endpoint::{RawSample, RawSubscription};
 use crate::error::RosError;
 use crate::health::{ASK_EVERY, Ailment, Health};
+use crate::managed::LifecycleServices;
 use crate::members::Identity;
 use crate::message::decode_as;
 use crate::minder::Minder;
@@ -59,6 +60,7 @@ struct Shared {
     minder: Arc<Minder>,
     replies: AllReplies,
     services: Mutex<Option<NodeServices>>,
+    lifecycle: Mutex<Option<LifecycleServices>>,
 }
 
 impl Background {
@@ -84,6 +86,7 @@ impl Background {
             minder,
             replies,
             services: Mutex::new(None),
+            lifecycle: Mutex::new(None),
         });
         let running = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
@@ -98,6 +101,17 @@ impl Background {
         services.set_signal(&self.shared.signal);
         *lock(&self.shared.services) = Some(services);
         self.shared.signal.raise();
+    }
+
+    /// From now on the thread answers for the life cycle.
+    pub(crate) fn manage(&self, services: LifecycleServices) {
+        *lock(&self.shared.lifecycle) = Some(services);
+        self.shared.signal.raise();
+    }
+
+    /// What wakes the thread.
+    pub(crate) fn signal(&self) -> &Signal {
+        &self.shared.signal
     }
 
     /// Why the node has to end, if it has to.
@@ -115,6 +129,7 @@ impl Drop for Background {
             drop(thread.join());
         }
         *lock(&self.shared.services) = None;
+        *lock(&self.shared.lifecycle) = None;
     }
 }
 
@@ -138,6 +153,11 @@ impl Shared {
                 && let Err(error) = services.serve()
             {
                 tracing::warn!("parameters: {error}");
+            }
+            if let Some(lifecycle) = lock(&self.lifecycle).as_ref()
+                && let Err(error) = lifecycle.serve()
+            {
+                tracing::warn!("life cycle: {error}");
             }
             if let Some(count) = dropped.news(|| self.dds.dropped()) {
                 self.roster.note_dropped(count);

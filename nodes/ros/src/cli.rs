@@ -157,6 +157,13 @@ impl RosArgs {
         self
     }
 
+    /// The same, with a value for a parameter of every node of the process.
+    #[must_use]
+    pub fn with_parameter(mut self, name: &str, value: Value) -> Self {
+        self.overrides.push(Override { scope: Scope::Process, name: name.to_owned(), value });
+        self
+    }
+
     /// The names of the node that the program calls `name` and puts into the namespace `usual`; in another one `/clock`
     /// is that namespace's, too.
     ///

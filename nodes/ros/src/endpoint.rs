@@ -1,7 +1,7 @@
 //! Writers and readers of CDR bytes: what recorder and player use, and what typed topics are made of.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use ros2_client::Gid;
@@ -12,7 +12,7 @@ use rustdds::{SampleIdentity, Timestamp, WriteOptionsBuilder};
 use crate::cdr::Cdr;
 use crate::error::RosError;
 use crate::notices::Trouble;
-use crate::qos::SEND_TIMEOUT;
+use crate::qos::{Profile, SEND_TIMEOUT};
 use crate::roster::{Direction, Roster};
 use crate::rtps::Prefix;
 use crate::signal::{Signal, lock};
@@ -128,13 +128,13 @@ pub struct RawSubscription {
     topic: String,
     roster: Arc<Roster>,
     bell: Arc<Bell>,
-    losses: Mutex<Losses>,
+    arrivals: Arc<Mutex<Arrivals>>,
 }
 
 impl RawSubscription {
     pub(crate) fn new(slot: Arc<ReaderSlot>, topic: String, roster: Arc<Roster>, signal: &Signal) -> Self {
         let bell = slot.hang(signal);
-        Self { slot, topic, roster, bell, losses: Mutex::default() }
+        Self { slot, topic, roster, bell, arrivals: Arc::default() }
     }
 
     /// The next sample, if there is one.
@@ -168,7 +168,7 @@ impl RawSubscription {
                 Ok(change) => {
                     return Ok(change.map(|change| {
                         let sample = raw_sample(change);
-                        lock(&self.losses).note(&sample.info);
+                        lock(&self.arrivals).note(&sample.info);
                         sample
                     }));
                 }
@@ -198,21 +198,30 @@ impl RawSubscription {
     }
 
     /// Samples that were sent but never taken: too many came before they were taken.
+    #[must_use]
     pub fn lost(&self) -> u64 {
-        lock(&self.losses).lost
+        lock(&self.arrivals).lost
+    }
+
+    /// What comes here, to look at from elsewhere.
+    pub(crate) fn watched(&self, profile: Profile) -> Watched {
+        Watched { topic: self.topic.clone(), profile, arrivals: Arc::downgrade(&self.arrivals) }
     }
 
     /// Writers that this reader receives from.
+    #[must_use]
     pub fn matched(&self) -> usize {
         self.roster.matched(self.gid()).len()
     }
 
     /// Fully qualified name of the topic.
+    #[must_use]
     pub fn topic(&self) -> &str {
         &self.topic
     }
 
     /// The reader's identity; another one after RustDDS has been started anew.
+    #[must_use]
     pub fn gid(&self) -> Gid {
         self.slot.gid()
     }
@@ -224,15 +233,52 @@ impl Drop for RawSubscription {
     }
 }
 
-/// Counts gaps in the numbers of each writer's samples.
-#[derive(Default)]
-struct Losses {
-    last: BTreeMap<Gid, i64>,
-    lost: u64,
+/// What has come on a topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// Fully qualified name of the topic.
+    pub topic: String,
+    /// How often something is expected.
+    pub profile: Profile,
+    /// Messages that were taken.
+    pub received: u64,
+    /// Messages that were sent but never taken.
+    pub lost: u64,
+    /// How long ago the last one was taken; nothing before the first.
+    pub age: Option<Duration>,
 }
 
-impl Losses {
+/// A subscription as it is looked at from elsewhere.
+pub(crate) struct Watched {
+    topic: String,
+    profile: Profile,
+    arrivals: Weak<Mutex<Arrivals>>,
+}
+
+impl Watched {
+    /// What has come; nothing once the subscription is gone.
+    pub(crate) fn look(&self) -> Option<Input> {
+        let arrivals = self.arrivals.upgrade()?;
+        let Arrivals { received, lost, at, .. } = &*lock(&arrivals);
+        let age = at.map(|at| at.elapsed());
+        Some(Input { topic: self.topic.clone(), profile: self.profile, received: *received, lost: *lost, age })
+    }
+}
+
+/// Counts samples, and gaps in the numbers of each writer's.
+#[derive(Default)]
+struct Arrivals {
+    last: BTreeMap<Gid, i64>,
+    received: u64,
+    lost: u64,
+    /// When the last one was taken.
+    at: Option<Instant>,
+}
+
+impl Arrivals {
     fn note(&mut self, info: &SampleInfo) {
+        self.received += 1;
+        self.at = Some(Instant::now());
         if let Some(last) = self.last.insert(info.writer, info.sequence_number) {
             self.lost += u64::try_from(info.sequence_number - last - 1).unwrap_or(0);
         }
@@ -279,10 +325,10 @@ mod tests {
             sequence_number,
             related: None,
         };
-        let mut losses = Losses::default();
+        let mut arrivals = Arrivals::default();
         for (writer, number) in [(1, 10), (2, 1), (1, 11), (2, 4), (1, 13)] {
-            losses.note(&info(writer, number));
+            arrivals.note(&info(writer, number));
         }
-        assert_eq!(losses.lost, 3);
+        assert_eq!((arrivals.received, arrivals.lost), (5, 3));
     }
 }

@@ -1,7 +1,8 @@
 //! A ROS 2 node: one process, one DDS participant, and the endpoints that are made from it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ros2_client::Gid;
@@ -16,12 +17,13 @@ use crate::clock::SimClock;
 use crate::dds::Dds;
 use crate::discovered::{RemoteWriter, remote_writers};
 use crate::drops::{Dropping, Drops};
-use crate::endpoint::{RawPublisher, RawSubscription};
+use crate::endpoint::{Input, RawPublisher, RawSubscription, Watched};
 use crate::entities::Plan;
 use crate::environment::Environment;
 use crate::error::RosError;
 use crate::graph::{self, Entry};
 use crate::logging;
+use crate::managed::{Managed, Questions};
 use crate::members::{Identity, Members};
 use crate::memory;
 use crate::message::encode_as;
@@ -30,13 +32,13 @@ use crate::names::{Names, dds_service, dds_topic, dds_type};
 use crate::node_services::NodeServices;
 use crate::notices::Notice;
 use crate::params::{Parameters, Spec};
-use crate::pulse::{Pulse, SIGN_EVERY, Sign, say};
+use crate::pulse::{Pulse, SIGN_EVERY};
 use crate::qos::{Profile, QosProfile, with_depth};
 use crate::replies::AllReplies;
 use crate::roster::{Direction, Roster};
 use crate::service::{Client, Server};
 use crate::shutdown::signalled;
-use crate::signal::Signal;
+use crate::signal::{Signal, lock};
 use crate::slot::WriterSlot;
 use crate::topic::{Publisher, Subscription};
 
@@ -67,6 +69,7 @@ pub struct Node {
     pulse: Pulse,
     epoch: u64,
     replies: AllReplies,
+    inputs: Mutex<Vec<Watched>>,
     drops: Arc<Drops>,
     names: Names,
     environment: Environment,
@@ -131,6 +134,7 @@ impl Node {
             pulse,
             epoch,
             replies,
+            inputs: Mutex::default(),
             drops: Arc::default(),
             names,
             environment,
@@ -188,6 +192,25 @@ impl Node {
         })
     }
 
+    /// The life cycle of this node, with its services and events; one call a node.
+    ///
+    /// # Errors
+    /// When DDS fails.
+    pub fn managed(&self) -> Result<Managed, RosError> {
+        let change = self.server(&graph::Service::new("~/change_state", &[], &[]))?;
+        let questions = Questions {
+            state: self.server(&graph::Service::new("~/get_state", &[], &[]))?,
+            states: self.server(&graph::Service::new("~/get_available_states", &[], &[]))?,
+            transitions: self.server(&graph::Service::new("~/get_available_transitions", &[], &[]))?,
+            graph: self.server(&graph::Service::new("~/get_transition_graph", &[], &[]))?,
+        };
+        let events = self.publisher(&graph::Topic::new("~/transition_event", Profile::Event, &[], &[]))?;
+        let signals = [&self.signal, self.background.signal()];
+        let (managed, services) = Managed::new(change, questions, events, self.clock.clone(), signals);
+        self.background.manage(services);
+        Ok(managed)
+    }
+
     /// A writer of a topic.
     ///
     /// # Errors
@@ -219,6 +242,7 @@ impl Node {
         let Entry { name, type_name, profile, .. } = topic.entry;
         let raw = self.raw_subscription(name, type_name, &with_depth(profile.qos(), depth))?;
         self.roster.remember(Direction::Read, raw.gid(), topic.entry);
+        lock(&self.inputs).push(raw.watched(profile));
         let drops = graph::COME_AGAIN.contains(&topic.entry).then(|| Arc::clone(&self.drops));
         Ok(Subscription::new(raw, topic.entry.writers, drops))
     }
@@ -361,6 +385,12 @@ impl Node {
         Ok(())
     }
 
+    /// What is missing, in words, until each of the nodes is matched as [`Self::wait_for_peers`] waits for it.
+    #[must_use]
+    pub fn missing_peers(&self, nodes: &[&str]) -> Vec<String> {
+        self.roster.missing(nodes)
+    }
+
     /// Waits until a server of the client's service is there.
     ///
     /// # Errors
@@ -423,9 +453,21 @@ impl Node {
         self.pulse.orphaned()
     }
 
+    /// How often another launcher has taken this node over.
+    #[must_use]
+    pub fn taken_over(&self) -> u64 {
+        self.pulse.taken_over()
+    }
+
     /// Tells the launcher that what was ordered befalls this node now; with its number among those, from 0.
     pub fn tell_struck(&self, number: u64) {
-        say(&Sign::Struck(number));
+        self.pulse.tell_struck(number);
+    }
+
+    /// What has come on each topic that this node subscribes to.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<Input> {
+        lock(&self.inputs).iter().filter_map(Watched::look).collect()
     }
 
     /// The names of this node.
@@ -470,7 +512,10 @@ fn declare_pulse(parameters: &Parameters) -> Result<Pulse, RosError> {
     let text =
         "How long the node goes on when the launcher, which listens on its stdout, is gone [s]; 0: none listens.";
     let limit = parameters.declare(Spec::new("orphaned_s", 0.0, text).in_range(0.0..=1e9).read_only())?;
-    Ok(Pulse::new((limit > 0.0).then(|| Duration::from_secs_f64(limit))))
+    let text = "Where a launcher listens that takes the node over when its own is gone; empty: nowhere.";
+    let next = PathBuf::from(parameters.declare(Spec::new("signs", String::new(), text).read_only())?);
+    let next = (!next.as_os_str().is_empty()).then_some(next);
+    Ok(Pulse::new((limit > 0.0).then(|| Duration::from_secs_f64(limit)), next))
 }
 
 /// Declares the parameter that bounds the memory of this process, and bounds it.

@@ -29,6 +29,8 @@ enum Command {
     Planner(operate::PlannerArgs),
     /// Say what is wrong, and what operators know of it.
     Alarms(operate::AlarmsArgs),
+    /// Say how the radio of a flying mission stands.
+    Link(operate::LinkArgs),
     /// Let a wheel, a sensor or a node of a flying mission fail, as a drill or a test.
     Fault(operate::FaultArgs),
     /// Say when stations see the satellite of a mission, from its file alone.
@@ -72,6 +74,7 @@ fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
         Command::Alarms(args) => operate::run_alarms(&args, ros)?,
+        Command::Link(args) => operate::run_link(&args, ros)?,
         Command::Fault(args) => operate::run_fault(&args, ros)?,
         Command::Passes(args) => passes::run(&args)?,
         Command::Console(_) => return Err(become_console()),

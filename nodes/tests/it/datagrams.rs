@@ -101,3 +101,13 @@ fn missions_fly_through_storms_of_damaged_datagrams() {
         }
     }
 }
+
+#[test]
+fn a_crowd_of_announced_participants_stays_outside() {
+    for words in [PACED, LOCKSTEP] {
+        fly(&words, |domain, flight| {
+            Stranger::towards(None, domain, 1, 2).announce_crowd(2000, 2);
+            assert!(flight.flies().unwrap(), "all were announced in flight");
+        });
+    }
+}

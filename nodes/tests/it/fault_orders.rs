@@ -48,10 +48,10 @@ fn what_is_ordered_on_the_way_befalls_the_mission_and_the_same_mission_flown_aga
         });
     }
     // The orders that were kept count for nodes that were started again since.
-    let late = order(&domain, "wheel3:weak 20%+30s");
+    let late = order(&domain, "wheel3:weak 60%+300s");
     common::until("the last wheel", || (events(&out, "wheel z").len() == 2).then_some(()));
     flight.stop();
-    for ((fault, alarm, delay), begins) in orders.into_iter().zip(begun).chain([(("wheel3", "wheel z", 40), late)]) {
+    for ((fault, alarm, delay), begins) in orders.into_iter().zip(begun).chain([(("wheel3", "wheel z", 60), late)]) {
         let events = events(&out, alarm);
         let [(raised, at), (returned, _)] = &events[..] else { panic!("{alarm}: {events:?}") };
         assert_eq!((raised.as_str(), returned.as_str()), ("raised", "returned"), "{alarm}");

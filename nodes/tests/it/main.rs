@@ -21,15 +21,19 @@ mod flight;
 mod full;
 mod habits;
 mod killed;
+mod lifecycle;
 mod operators_day;
 mod parity;
 mod peer;
 mod pins;
+mod radio;
 mod readme;
 mod recorded;
+mod start_and_end;
 mod storm;
 #[path = "../../ros/tests/it/stranger.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod stranger;
 mod supervised;
+mod taken_over;
 mod two_satellites;

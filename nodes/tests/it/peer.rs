@@ -1,5 +1,5 @@
 //! An outside ROS 2 peer (CycloneDDS) receives states and status, submits strips that are then imaged, previews one and
-//! cancels one, and acknowledges an alarm.
+//! cancels one, hears of the health of nodes, and acknowledges an alarm.
 
 use crate::common;
 
@@ -26,6 +26,9 @@ fn a_cyclonedds_peer_sees_the_mission_and_has_a_strip_imaged() {
     }
     assert_eq!(seen["no_opportunity"], 110, "{seen}");
     assert_eq!(seen["cancelled"], serde_json::json!([[true, 0], [false, 120]]), "{seen}");
+    let well = serde_json::json!({ "guidance": 0, "planner": 0, "request_manager": 0, "spacecraft": 0 });
+    assert_eq!((&seen["levels"], &seen["restarts"]), (&well, &serde_json::json!(["0", "0", "0", "0"])), "{seen}");
+    assert!(seen["states_hz"].as_f64().unwrap() > 1.0 && seen["states_age_s"].as_f64().unwrap() < 2.0, "{seen}");
     assert_eq!(seen["alarm"], serde_json::json!(["guidance", 2, 1, 1]), "{seen}");
     assert_eq!(seen["unknown_alarm"], serde_json::json!([false, "there is no alarm `wheel q` of guidance"]), "{seen}");
     assert_eq!(seen["acknowledged"], serde_json::json!([true, 2]), "{seen}");

@@ -10,10 +10,11 @@ use serde_json::Value;
 
 use crate::common;
 
-const NODES: [&str; 5] = ["swath-spacecraft", "swath-guidance", "swath-planner", "swath-requests", "swath-bag"];
+/// The programs of a mission.
+pub const NODES: [&str; 5] = ["swath-spacecraft", "swath-guidance", "swath-planner", "swath-requests", "swath-bag"];
 
 /// The process of a program that works for the mission in a folder.
-fn process(program: &str, out: &Path) -> Option<Pid> {
+pub fn process(program: &str, out: &Path) -> Option<Pid> {
     let out = out.display().to_string();
     let of = |entry: std::io::Result<std::fs::DirEntry>| {
         let pid: i32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
@@ -25,12 +26,14 @@ fn process(program: &str, out: &Path) -> Option<Pid> {
     std::fs::read_dir("/proc").unwrap().filter_map(of).last().and_then(Pid::from_raw)
 }
 
-fn tasks(out: &Path) -> Vec<Value> {
+/// The tasks that were flown.
+pub fn tasks(out: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(out.join("tasks.jsonl")).unwrap_or_default();
     common::json_lines(&text[..text.rfind('\n').map_or(0, |end| end + 1)])
 }
 
-fn journal(out: &Path) -> Vec<Value> {
+/// What happened to alarms.
+pub fn journal(out: &Path) -> Vec<Value> {
     common::json_lines(&std::fs::read_to_string(out.join("alarms.jsonl")).unwrap_or_default())
 }
 
@@ -41,18 +44,18 @@ fn events(out: &Path, name: &str) -> Vec<String> {
 }
 
 /// Waits until the mission has flown some tasks more.
-fn until_it_flies(out: &Path) {
+pub fn until_it_flies(out: &Path) {
     let before = tasks(out).len();
     common::until("more tasks", || (tasks(out).len() > before + 2).then_some(()));
 }
 
-fn launch(domain: &str, mission: &Path, out: &Path) -> Command {
+pub fn launch(domain: &str, mission: &Path, out: &Path) -> Command {
     let mut launch = common::command("swath", domain);
     launch.arg("launch").arg(mission).arg("--out").arg(out);
     launch
 }
 
-fn validate(bag: &Path) -> String {
+pub fn validate(bag: &Path) -> String {
     let mut validate = common::command("swath-bag", "0");
     common::succeed(validate.arg("validate").arg(bag))
 }

@@ -212,6 +212,30 @@ class PreviewResponse(IdlStruct, typename="swath_msgs::srv::dds_::PreviewStrip_R
 
 @dataclass
 @ann.final
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+@ann.final
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@dataclass
+@ann.final
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header
+    status: sequence[DiagnosticStatus]
+
+
+@dataclass
+@ann.final
 class Alarm(IdlStruct, typename="swath_msgs::msg::dds_::Alarm_"):
     node: str
     name: str
@@ -274,6 +298,8 @@ class Peer:
         self.states = reader("rt/swath/spacecraft/state", SpacecraftState)
         self.events = reader("rt/swath/requests/events", StripStatus)
         self.plain = writer("rt/swath/requests/request", StripRequest)
+        self.diagnostics = reader("rt/diagnostics", DiagnosticArray)
+        self.health = {}
         self.alarms = reader("rt/swath/alarms/standing", StandingAlarms, latched)
         self.services = {
             name: (writer(f"rq/swath/{name}Request", request), reader(f"rr/swath/{name}Reply", response))
@@ -323,6 +349,16 @@ class Peer:
         make = lambda client, number: AcknowledgeRequest(client, number, node, name, "peer", "seen")
         return self.call("alarms/acknowledge", make)
 
+    def healthy(self):
+        """What each node tells of its own health, by its name, once all have told of a second in flight."""
+        for array in self.diagnostics.take(100):
+            for status in array.status:
+                node, _, kind = status.name.partition(": ")
+                values = {value.key: value.value for value in status.values}
+                if kind == "health" and float(values["simulated_s_per_s"]) > 0.0:
+                    self.health[node.removeprefix("/swath/")] = (status.level, values)
+        return self.health if len(self.health) == 4 else None
+
     def alarm(self, name):
         """An alarm as it stands, told whenever one of them changes."""
         for standing in self.alarms.take(10):
@@ -351,6 +387,7 @@ def main():
     # The strip that comes last has the most time to be taken back.
     last = peer.submit([request("peer-cancel", 7.0, 33.0)])[0].id
     cancelled = peer.cancel([last, 123456])
+    health = peer.wait("the health of four nodes", peer.healthy)
     alarm = peer.wait("an alarm", lambda: peer.alarm("wheel y"))
     unknown = peer.acknowledge("guidance", "wheel q")
     known = peer.acknowledge("guidance", "wheel y")
@@ -376,6 +413,10 @@ def main():
         "elevations": [opportunity.min_elevation for opportunity in preview.opportunities],
         "no_opportunity": no_preview.reason_code,
         "cancelled": [(result.accepted, result.reason_code) for result in cancelled],
+        "levels": {node: level for node, (level, _) in health.items()},
+        "restarts": [values["restarts"] for _, values in health.values()],
+        "states_hz": float(health["guidance"][1]["/swath/spacecraft/state hz"]),
+        "states_age_s": float(health["guidance"][1]["/swath/spacecraft/state age_s"]),
         "alarm": [alarm.node, alarm.severity, alarm.state, alarm.sequence],
         "unknown_alarm": [unknown.accepted, unknown.reason],
         "acknowledged": [known.accepted, acknowledged.state],

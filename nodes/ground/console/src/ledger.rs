@@ -8,6 +8,7 @@ use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs as msg;
+use swath_node::health::HEALTH;
 use swath_node::stamp::nanoseconds;
 use swath_ros::graph;
 
@@ -269,7 +270,7 @@ impl Ledger {
         if self.kept {
             return;
         }
-        for status in array.status.iter().filter(|status| status.level != DiagnosticStatus::OK) {
+        for status in array.status.iter().filter(|status| is_alarm(status)) {
             let number = self.number(status.name.clone(), status.message.clone());
             self.acknowledged.remove(&number);
             self.tell_at(&array.header.stamp, &facts::alarm(number, status));
@@ -374,6 +375,12 @@ impl Ledger {
             self.tell(self.now_ms, &nodes);
         }
     }
+}
+
+/// Whether something is wrong of which an operator has to know: what a node says of its health is no alarm.
+fn is_alarm(status: &DiagnosticStatus) -> bool {
+    let name = status.name.rsplit_once(": ").map(|(_, name)| name);
+    status.level != DiagnosticStatus::OK && name != Some(HEALTH)
 }
 
 #[cfg(test)]
@@ -481,6 +488,7 @@ mod tests {
         };
         raise(&mut ledger, "guidance: late", DiagnosticStatus::WARN);
         raise(&mut ledger, "guidance: well", DiagnosticStatus::OK);
+        raise(&mut ledger, "guidance: health", DiagnosticStatus::WARN);
         raise(&mut ledger, "planner: lost", DiagnosticStatus::ERROR);
         assert!(ledger.acknowledge(1, "console"));
         assert!(!ledger.acknowledge(1, "console"), "it is acknowledged");

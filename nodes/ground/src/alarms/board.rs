@@ -24,6 +24,8 @@ pub struct FlyingBoard {
     /// What the journal is made of: what two nodes report of one tick comes in any order.
     reports: Vec<Report>,
     wishes: Vec<Wish>,
+    /// Reports of before this process, which may be told again.
+    before: usize,
     standing: Publisher<msg::StandingAlarms>,
     events: Publisher<msg::AlarmEvent>,
     acknowledge: Server<msg::AcknowledgeAlarm>,
@@ -45,6 +47,7 @@ impl FlyingBoard {
             planned: planned.into(),
             reports: Vec::new(),
             wishes: Vec::new(),
+            before: 0,
             standing: node.publisher(&graph::STANDING_ALARMS)?,
             events: node.publisher(&graph::ALARM_EVENTS)?,
             acknowledge: node.server(&graph::ACKNOWLEDGE_ALARM)?,
@@ -56,8 +59,36 @@ impl FlyingBoard {
         Ok(board)
     }
 
+    /// Goes on from what another process has kept of this mission. What is reported again, by nodes or by the plan, is
+    /// nothing new.
+    ///
+    /// # Errors
+    /// When DDS fails.
+    pub fn take_up(&mut self, reports: Vec<Report>, wishes: Vec<Wish>) -> Result<()> {
+        report_all(&mut self.board, reports.clone(), &wishes);
+        // It was told of when it happened.
+        let _ = self.board.take_journal();
+        (self.before, self.reports, self.wishes) = (reports.len(), reports, wishes);
+        self.tell_standing()
+    }
+
+    /// What was reported, and what operators wished.
+    #[must_use]
+    pub fn kept(&self) -> (&[Report], &[Wish]) {
+        (&self.reports, &self.wishes)
+    }
+
+    /// Up to when the board is.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.board.now()
+    }
+
     /// A node says whether something is wrong.
     pub fn report(&mut self, report: Report) {
+        if self.reports.iter().take(self.before).any(|known| *known == report) {
+            return;
+        }
         self.show(&report);
         self.reports.push(report);
     }

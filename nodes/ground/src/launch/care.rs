@@ -63,7 +63,9 @@ impl Launcher {
                 }
                 let new = FaultPlan { plan: vec![order.fault], random: 0 };
                 self.alarms.plan(of_plan(&new, period));
-                self.recorder_faults.extend(new.of(Process::Recorder, period));
+                let since = self.recorder_since;
+                let of_recorder = new.of(Process::Recorder, period).into_iter();
+                self.recorder_faults.extend(of_recorder.filter(|(it, _)| it.from > since));
                 self.recorder_faults.make_contiguous().sort_by_key(|(it, _)| it.from);
             }
         }
@@ -118,7 +120,7 @@ impl Launcher {
     /// and without another one the mission ends.
     fn give_up(&mut self, fleet: &mut Fleet, node: &str, tick: Tick, reason: String) -> Result<()> {
         tracing::error!("{reason}");
-        if !graph::FLIGHT_NODES.contains(&node) {
+        if !graph::ALL_FLIGHT_NODES.contains(&node) {
             return Ok(());
         }
         self.tell(tick, SAFE_MODE, true, &reason);

@@ -1,21 +1,20 @@
 //! The processes of a mission: started, listened to, and started again when they are lost.
 
-use std::io::{BufRead, BufReader};
-use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use rustix::process::Signal;
 use swath_bags::cli::NO_ROOM;
 use swath_ros::{Sign, graph};
 
 use swath_mission::outcome::NodeProcess;
 use swath_mission::supervision::{Heard, Step, SupervisionConfig, Watch};
 
-/// How long a process may take to end after it was asked to.
-const STOP_TIMEOUT: Duration = Duration::from_secs(20);
+use super::kept::{Keeping, KeptMember};
+use super::process::{Ending, Running};
+
 /// How long what a process has said before it ended may take to be read.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 
@@ -26,6 +25,7 @@ pub struct Fleet {
     began: Instant,
     /// Simulated time as the nodes know it [ns].
     now_ns: u64,
+    keeping: Keeping,
 }
 
 /// What has become of a process.
@@ -74,7 +74,7 @@ pub enum Happened {
 
 struct Member {
     name: String,
-    program: PathBuf,
+    program: String,
     /// Words of its command line, the last ones ROS's.
     args: Vec<String>,
     /// Parameters of the next start.
@@ -94,24 +94,42 @@ struct Member {
     beside: bool,
 }
 
-struct Running {
-    child: Child,
-    lines: Receiver<String>,
-}
-
 impl Fleet {
     /// No processes yet.
-    pub fn new(config: &SupervisionConfig) -> Self {
-        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0 }
+    pub fn new(config: &SupervisionConfig, keeping: Keeping) -> Self {
+        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0, keeping }
+    }
+
+    /// The processes that a launcher before has left; those that have ended meanwhile are started again.
+    pub fn take_over(config: &SupervisionConfig, keeping: Keeping) -> Result<Self> {
+        let mut fleet = Self::new(config, keeping);
+        for kept in fleet.keeping.fleet()? {
+            let signs = fleet.keeping.signs(&kept.name);
+            let running = kept.process.map_or(Ok(None), |process| Running::take_over(process, &signs))?;
+            let mut member = fleet.member(&kept.name, &kept.program, &kept.args);
+            member.lost = running.is_none();
+            if member.lost {
+                let _ = member.watch.lost(fleet.began.elapsed());
+            }
+            let KeptMember { extra, epoch, struck, beside, .. } = kept;
+            fleet.members.push(Member { extra, epoch, struck, beside, running, ..member });
+        }
+        Ok(fleet)
+    }
+
+    /// Keeps who flies.
+    fn keep(&self) -> Result<()> {
+        let members: Vec<KeptMember> = self.members.iter().map(Member::kept).collect();
+        self.keeping.keep_fleet(&members)
     }
 
     /// Starts a program of this suite: the one beside this executable, or else the one on the PATH. The words end with
     /// those of ROS.
     pub fn start(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
         let mut member = self.member(name, program, args);
-        member.start(&self.config)?;
+        member.start(&self.config, &self.keeping)?;
         self.members.push(member);
-        Ok(())
+        self.keep()
     }
 
     /// As [`Self::start`], a process without which the mission goes on, and which gives no sign of life. It is started
@@ -119,15 +137,15 @@ impl Fleet {
     pub fn start_beside(&mut self, name: &str, program: &str, args: &[String]) -> Result<()> {
         let mut member = self.member(name, program, args);
         member.beside = true;
-        member.start(&self.config)?;
+        member.start(&self.config, &self.keeping)?;
         self.members.push(member);
-        Ok(())
+        self.keep()
     }
 
     fn member(&self, name: &str, program: &str, args: &[String]) -> Member {
         Member {
             name: name.to_owned(),
-            program: program_path(program),
+            program: program.to_owned(),
             args: args.to_vec(),
             extra: Vec::new(),
             running: None,
@@ -167,9 +185,8 @@ impl Fleet {
     pub fn freeze(&mut self, node: &str) -> Result<()> {
         for member in self.members.iter_mut().filter(|member| member.name == node) {
             member.by_order = true;
-            let pid = member.running.as_ref().and_then(|it| rustix::process::Pid::from_raw(it.child.id() as i32));
-            if let Some(pid) = pid {
-                rustix::process::kill_process(pid, rustix::process::Signal::STOP)?;
+            if let Some(running) = &member.running {
+                running.send(Signal::STOP)?;
             }
         }
         Ok(())
@@ -178,7 +195,8 @@ impl Fleet {
     /// Whether every process that is not given up is there.
     pub fn is_whole(&self) -> bool {
         let there = |member: &Member| member.running.is_some() && !member.lost;
-        self.members.iter().all(|member| member.watch.given_up() || member.no_room || there(member))
+        let waits_for_room = |member: &Member| member.running.is_none() && member.no_room;
+        self.members.iter().all(|member| member.watch.given_up() || waits_for_room(member) || there(member))
     }
 
     /// Simulated time as the nodes know it [ns].
@@ -208,8 +226,8 @@ impl Fleet {
     /// Fails when a process has ended: so it is before the mission has begun.
     pub fn check(&mut self) -> Result<()> {
         for member in self.members.iter_mut().filter(|member| !member.beside) {
-            if let Some(status) = member.ended()? {
-                bail!("{} before the mission was over", ending(&member.name, status));
+            if let Some(ending) = member.ended()? {
+                bail!("{} before the mission was over", ending.of(&member.name));
             }
         }
         Ok(())
@@ -218,10 +236,14 @@ impl Fleet {
     /// Listens to all processes, kills those that hang, starts those that were lost again, and tells of it.
     pub fn supervise(&mut self) -> Result<Vec<Event>> {
         let mut events = Vec::new();
+        let before: Vec<_> = self.members.iter().map(Member::marks).collect();
         for member in &mut self.members {
             let now = self.began.elapsed();
-            let happened = member.supervise(now, &mut self.now_ns, &self.config)?;
+            let happened = member.supervise(now, &mut self.now_ns, &self.config, &self.keeping)?;
             events.extend(happened.into_iter().map(|what| Event { node: member.name.clone(), what }));
+        }
+        if self.members.iter().map(Member::marks).ne(before) {
+            self.keep()?;
         }
         Ok(events)
     }
@@ -230,7 +252,7 @@ impl Fleet {
     pub fn processes(&self) -> Vec<NodeProcess> {
         let of = |member: &Member| {
             let running = member.running.as_ref()?;
-            Some(NodeProcess { name: member.name.clone(), pid: running.child.id() })
+            Some(NodeProcess { name: member.name.clone(), pid: running.pid() })
         };
         self.members.iter().filter_map(of).collect()
     }
@@ -246,10 +268,10 @@ impl Fleet {
                 }
                 bail!("node {name} was lost and is not there again")
             };
-            let status = stop(&mut running.child)?;
-            let no_room = *name == graph::RECORDER && status.code() == Some(i32::from(NO_ROOM));
-            if !status.success() && !no_room {
-                bail!("{}", ending(name, status));
+            let ending = running.stop()?;
+            let no_room = *name == graph::RECORDER && ending.code() == Some(i32::from(NO_ROOM));
+            if !ending.is_well() && !no_room {
+                bail!("{}", ending.of(name));
             }
         }
         Ok(())
@@ -257,44 +279,59 @@ impl Fleet {
 }
 
 impl Member {
-    fn start(&mut self, config: &SupervisionConfig) -> Result<()> {
-        let mut own = vec![format!("epoch:={}", self.epoch), format!("orphaned_s:={:?}", config.orphaned_s)];
+    fn start(&mut self, config: &SupervisionConfig, keeping: &Keeping) -> Result<()> {
+        let signs = keeping.make_signs(&self.name)?;
+        let mut own = vec![
+            format!("epoch:={}", self.epoch),
+            format!("orphaned_s:={:?}", config.orphaned_s),
+            format!("signs:={}", signs.display()),
+        ];
         if self.beside {
             own.clear();
         } else if self.struck > 0 {
             own.push(format!("struck:={}", self.struck));
         }
-        let mut child = Command::new(&self.program)
-            .args(&self.args)
-            .args(own.iter().flat_map(|it| ["-p", it]))
-            .args(&self.extra)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("cannot start node {}: {}", self.name, self.program.display()))?;
-        let (sender, lines) = channel();
-        if let Some(stdout) = child.stdout.take() {
-            std::thread::spawn(move || {
-                for line in BufReader::new(stdout).lines().map_while(Result::ok) {
-                    if sender.send(line).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        self.running = Some(Running { child, lines });
+        let program = program_path(&self.program);
+        let mut command = Command::new(&program);
+        command.args(&self.args).args(own.iter().flat_map(|it| ["-p", it])).args(&self.extra);
+        let failed = || format!("cannot start node {}: {}", self.name, program.display());
+        self.running = Some(Running::start(&mut command).with_context(failed)?);
         Ok(())
     }
 
+    fn kept(&self) -> KeptMember {
+        KeptMember {
+            name: self.name.clone(),
+            program: self.program.clone(),
+            args: self.args.clone(),
+            extra: self.extra.clone(),
+            epoch: self.epoch,
+            struck: self.struck,
+            beside: self.beside,
+            process: self.running.as_ref().and_then(Running::name),
+        }
+    }
+
+    /// What changes whenever something has to be kept.
+    fn marks(&self) -> (u64, u64, usize, Option<u32>) {
+        (self.epoch, self.struck, self.extra.len(), self.running.as_ref().map(Running::pid))
+    }
+
     /// What has become of it since the last call.
-    fn supervise(&mut self, now: Duration, now_ns: &mut u64, config: &SupervisionConfig) -> Result<Vec<Happened>> {
+    fn supervise(
+        &mut self,
+        now: Duration,
+        now_ns: &mut u64,
+        config: &SupervisionConfig,
+        keeping: &Keeping,
+    ) -> Result<Vec<Happened>> {
         let (first, heard) = self.listen(now, now_ns);
         let mut told: Vec<Happened> = heard.then_some(Happened::Heard).into_iter().collect();
         if first {
             told.extend(self.back());
         }
-        if let Some(status) = self.ended()? {
-            told.push(self.over(status, now, now_ns));
+        if let Some(ending) = self.ended()? {
+            told.push(self.over(ending, now, now_ns));
             return Ok(told);
         }
         if self.beside && self.running.is_some() {
@@ -311,7 +348,7 @@ impl Member {
             }
             Step::Start => {
                 self.epoch += 1;
-                self.start(config)?;
+                self.start(config, keeping)?;
                 self.watch.started(now);
                 tracing::info!("node {} is started again", self.name);
             }
@@ -330,19 +367,19 @@ impl Member {
     }
 
     /// Its process has ended.
-    fn over(&mut self, status: ExitStatus, now: Duration, now_ns: &mut u64) -> Happened {
+    fn over(&mut self, ending: Ending, now: Duration, now_ns: &mut u64) -> Happened {
         self.hear_out(now, now_ns);
         self.running = None;
         self.lost = true;
-        let how = ending(&self.name, status);
-        self.no_room = self.name == graph::RECORDER && status.code() == Some(i32::from(NO_ROOM));
+        let how = ending.of(&self.name);
+        self.no_room = self.name == graph::RECORDER && ending.code() == Some(i32::from(NO_ROOM));
         if self.no_room {
             tracing::warn!("{how}: there is no room for the bag");
             self.watch.wants(now);
             return Happened::NoRoom;
         }
         // One that ends by itself has said why, and would do so again.
-        let leaves = self.beside && status.signal().is_none();
+        let leaves = self.beside && !ending.is_killed();
         let step = if leaves { self.watch.give_up() } else { self.watch.lost(now) };
         tracing::warn!("{how}");
         match step {
@@ -352,9 +389,8 @@ impl Member {
     }
 
     /// How its process has ended, if it has.
-    fn ended(&mut self) -> Result<Option<ExitStatus>> {
-        let Some(running) = &mut self.running else { return Ok(None) };
-        Ok(running.child.try_wait()?)
+    fn ended(&mut self) -> Result<Option<Ending>> {
+        self.running.as_mut().map_or(Ok(None), Running::ended)
     }
 
     /// Takes in what it has said; returns whether it gives its first sign of life since its start, and whether one came
@@ -391,55 +427,19 @@ impl Member {
     }
 
     fn kill(&mut self) -> Result<()> {
-        match &mut self.running {
-            Some(running) => running.child.kill().with_context(|| format!("cannot kill node {}", self.name)),
-            None => Ok(()),
-        }
+        self.running.as_ref().map_or(Ok(()), |running| running.send(Signal::KILL))
     }
 }
 
 impl Drop for Fleet {
     fn drop(&mut self) {
         let running = || self.members.iter().filter_map(|member| member.running.as_ref());
-        running().for_each(|running| interrupt(&running.child));
+        // Nothing more can be done for a process that cannot be ended.
+        running().for_each(|running| _ = running.send(Signal::INT));
         for running in self.members.iter_mut().filter_map(|member| member.running.as_mut()) {
-            // Nothing more can be done for a process that cannot be ended.
-            let _ = stop(&mut running.child);
+            let _ = running.stop();
         }
     }
-}
-
-/// How a process has ended, in words. One that fails says why by itself; one that is killed cannot.
-fn ending(name: &str, status: ExitStatus) -> String {
-    match (status.code(), status.signal()) {
-        (Some(0), _) => format!("node {name} has ended"),
-        (Some(code), _) => format!("node {name} has failed (exit code {code}; it has said why)"),
-        (None, Some(signal)) => format!("node {name} was killed by signal {signal}"),
-        (None, None) => format!("node {name} has ended ({status})"),
-    }
-}
-
-fn interrupt(child: &Child) {
-    if let Some(pid) = rustix::process::Pid::from_raw(child.id() as i32) {
-        // It may have ended by itself.
-        let _ = rustix::process::kill_process(pid, rustix::process::Signal::INT);
-    }
-}
-
-fn stop(child: &mut Child) -> Result<ExitStatus> {
-    if let Some(status) = child.try_wait()? {
-        return Ok(status);
-    }
-    interrupt(child);
-    let deadline = Instant::now() + STOP_TIMEOUT;
-    while Instant::now() < deadline {
-        if let Some(status) = child.try_wait()? {
-            return Ok(status);
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    child.kill()?;
-    Ok(child.wait()?)
 }
 
 fn program_path(program: &str) -> PathBuf {

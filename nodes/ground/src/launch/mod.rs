@@ -2,15 +2,17 @@
 
 mod care;
 mod fleet;
+mod kept;
 mod output;
 mod over_dds;
+mod process;
 mod progress;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Error, Result, bail};
+use anyhow::{Context as _, Error, Result, bail};
 use clap::Args;
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::requests::scenario::ScenarioConfig;
@@ -40,7 +42,13 @@ use crate::requests::orders::outcomes;
     swath launch examples/missions/operators_day.toml --console")]
 pub struct LaunchArgs {
     /// Mission file (TOML).
-    pub mission: PathBuf,
+    #[arg(required_unless_present = "attach")]
+    pub mission: Option<PathBuf>,
+    /// Take over a mission whose launcher is gone: its output folder. Its nodes fly on, those that have ended are started
+    /// again, and it is watched to its end.
+    #[arg(long, value_name = "OUT", conflicts_with_all = ["mission", "out", "in_process", "no_bag", "orbits", "requests",
+        "planner", "seed", "pace", "console", "namespace"])]
+    pub attach: Option<PathBuf>,
     /// Folder for bag, tasks and summary; it must be empty or not exist [default: out/NAME-SEED-N].
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -81,7 +89,8 @@ pub struct LaunchArgs {
 
 impl LaunchArgs {
     fn mission(&self) -> Result<Mission> {
-        let mut mission = Mission::read(&self.mission)?;
+        let path = self.mission.as_deref().context("there is no mission file")?;
+        let mut mission = Mission::read(path)?;
         if let Some(orbits) = self.orbits {
             mission.orbits = orbits;
         }
@@ -119,6 +128,12 @@ const SAFE_MODE: u8 = 4;
 /// When the mission is not valid, a node fails or never comes up, or an output cannot be written. What was flown until
 /// then is in the outputs; where nothing was, there are none.
 pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<ExitCode> {
+    if let Some(folder) = &args.attach {
+        let (mut output, lines) = OutputFolder::reopen(folder)?;
+        let mission = Mission::read(&folder.join("mission.toml"))?;
+        let flown = over_dds::take_over(&mission, ros, &mut output, &lines)?;
+        return tell(args, &mission, &output, flown);
+    }
     let mission = args.mission()?;
     if args.in_process {
         mission.faults.fits_one_process()?;
@@ -126,9 +141,6 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         mission.faults.fits_dds()?;
         if mission.sim.resources.is_some() {
             bail!("a mission with [resources] flies in one process only: add --in-process");
-        }
-        if mission.link.is_some() {
-            bail!("a mission with [link] flies in one process only: add --in-process");
         }
     }
     for unseen in mission.stations_never_seen()? {
@@ -138,13 +150,18 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
     faults.iter().for_each(out::say);
     let mut output = OutputFolder::create(args.out.as_deref(), &mission)?;
     let flown = fly(args, &args.place.args(ros), &mission, &requests, &mut output, policies);
-    let Flown { summary, failure, safe_mode } = match flown {
-        Ok(flown) => flown,
+    match flown {
+        Ok(flown) => tell(args, &mission, &output, flown),
         Err(error) => {
             output.discard()?;
-            return Err(error);
+            Err(error)
         }
-    };
+    }
+}
+
+/// Writes and prints what came of a mission, and puts it into an exit code.
+fn tell(args: &LaunchArgs, mission: &Mission, output: &OutputFolder, flown: Flown) -> Result<ExitCode> {
+    let Flown { summary, failure, safe_mode } = flown;
     output.write_summary(&summary)?;
     if args.json {
         out::print_line(serde_json::to_string_pretty(&summary)?)?;
@@ -182,7 +199,7 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
-        let wishes = Wishes { record: !args.no_bag, console: args.console };
+        let wishes = Wishes { record: !args.no_bag, console: args.console, radio: mission.link.is_some() };
         over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
     }
 }

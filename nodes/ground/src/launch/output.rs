@@ -50,6 +50,19 @@ impl OutputFolder {
         Ok(Self { path, made, tasks: BufWriter::new(tasks) })
     }
 
+    /// The folder of a mission that was begun, and the tasks that are written there. A line that is not whole is dropped.
+    pub fn reopen(path: &Path) -> Result<(Self, Vec<TaskLine>)> {
+        let tasks = path.join("tasks.jsonl");
+        let failed = || format!("no mission can be taken over here: {}", tasks.display());
+        let text = fs::read_to_string(&tasks).with_context(failed)?;
+        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        let lines = text[..whole].lines().map(serde_json::from_str);
+        let lines = lines.collect::<Result<Vec<TaskLine>, _>>().with_context(failed)?;
+        let file = fs::OpenOptions::new().append(true).open(&tasks).with_context(failed)?;
+        file.set_len(whole as u64).with_context(failed)?;
+        Ok((Self { path: path.to_owned(), made: false, tasks: BufWriter::new(file) }, lines))
+    }
+
     /// Removes all that is in the folder, so that it can be asked for again: nothing was flown.
     pub fn discard(self) -> Result<()> {
         let failed = || format!("cannot clear output folder {}", self.path.display());

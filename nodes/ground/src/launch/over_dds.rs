@@ -1,4 +1,4 @@
-//! A mission over DDS: four nodes and the recorder, each a process of its own.
+//! A mission over DDS: the nodes that fly and the recorder, each a process of its own.
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -8,15 +8,19 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
+use swath_node::health::{HEALTH, STATE};
 use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
-use swath_ros::{Node, RosArgs, Shutdown, Subscription, graph, stamp};
+use swath_ros::lifecycle::State;
+use swath_ros::{Environment, Node, RosArgs, Shutdown, Subscription, Value, graph, stamp};
+use swath_sim::task::{FailureReason, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use super::fleet::Fleet;
+use super::kept::{Keeping, KeptFlight};
 use super::output::{Flown, OutputFolder};
 use super::progress::Progress;
 use crate::alarms::FlyingBoard;
@@ -27,9 +31,13 @@ use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::faults::{FaultPlan, What};
 use swath_mission::file::Mission;
-use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs};
+use swath_mission::link::ground::Ground;
+use swath_mission::link::response::LinkSummary;
+use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs, TaskLine};
+use swath_mission::requests::journal::{Attempt, Outcome as AttemptOutcome};
 use swath_mission::task_log::TaskLog;
 
+use crate::requests::ground_end::GroundEnd;
 use crate::requests::orders::{Orders, stored};
 use crate::requests::store::Store;
 
@@ -46,6 +54,10 @@ const JOURNAL_DELAY: Duration = Duration::from_millis(500);
 const WAIT: Duration = Duration::from_millis(100);
 /// How long nodes that are started again at the very end may take to be there.
 const WHOLE_TIMEOUT: Duration = Duration::from_secs(20);
+/// How often what another launcher must know is kept.
+const KEEP_EVERY: Duration = Duration::from_secs(1);
+/// How long a launcher that takes over waits for nodes to be there.
+const MATCH_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// What there is besides the nodes that fly.
 #[derive(Clone, Copy)]
@@ -54,6 +66,8 @@ pub struct Wishes {
     pub record: bool,
     /// Where the console listens, if there is one.
     pub console: Option<SocketAddr>,
+    /// Whether there is a radio between ground and satellite.
+    pub radio: bool,
 }
 
 /// Flies a mission over DDS; an error where nothing was flown.
@@ -65,12 +79,13 @@ pub fn fly(
     wishes: Wishes,
     policies: &Policies,
 ) -> Result<Flown> {
-    let mut launcher = Launcher::start(mission, ros)?;
+    let keeping = Keeping::new(output.make_state_folder()?);
+    let _lock = keeping.lock()?;
+    let mut launcher = Launcher::start(mission, ros, keeping.clone(), wishes.record)?;
     let namespace = launcher.node.names().namespace().to_owned();
     let manifest_data = manifest_data(mission, &namespace, policies);
-    let mut fleet = Fleet::new(&mission.supervision);
-    let record = wishes.record;
-    if record {
+    let mut fleet = Fleet::new(&mission.supervision, keeping);
+    if wishes.record {
         let words = [manifest_data, full_bag(&launcher)].concat();
         start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words)?;
     }
@@ -78,6 +93,36 @@ pub fn fly(
         show(&mut fleet, &mission.name, &namespace, address)?;
     }
     start_nodes(&mut fleet, mission_file, &namespace, output, wishes)?;
+    launcher.keep()?;
+    land(mission, launcher, fleet, output)
+}
+
+/// Takes over a mission whose launcher is gone, and flies it to its end.
+pub fn take_over(mission: &Mission, ros: &RosArgs, output: &mut OutputFolder, flown: &[TaskLine]) -> Result<Flown> {
+    let keeping = Keeping::new(output.make_state_folder()?);
+    let _lock = keeping.lock()?;
+    let kept = keeping.flight()?;
+    let domain = Environment::read()?.domain;
+    if domain != kept.domain {
+        bail!("this mission flies in domain {}, not in {domain}: set ROS_DOMAIN_ID", kept.domain);
+    }
+    let epoch = i64::try_from(kept.epoch + 1)?;
+    let ros = ros.clone().in_namespace(&kept.namespace).with_parameter("epoch", Value::Integer(epoch));
+    let mut launcher = Launcher::start(mission, &ros, keeping.clone(), kept.record)?;
+    launcher.take_up(kept, flown)?;
+    // Nodes tell a launcher that has just come what it must know: it should be there for them. Some may be lost.
+    if let Err(missing) = launcher.node.wait_for_peers(&graph::FLIGHT_NODES, MATCH_TIMEOUT) {
+        tracing::warn!("{missing}");
+    }
+    launcher.catch_up(output)?;
+    let fleet = Fleet::take_over(&mission.supervision, keeping)?;
+    launcher.keep()?;
+    land(mission, launcher, fleet, output)
+}
+
+/// Watches a mission to its end, ends its processes, and tells what came of it.
+fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mut OutputFolder) -> Result<Flown> {
+    let record = launcher.record;
     let nodes = fleet.processes();
     let watched = launcher.watch(&mut fleet, output);
     let Some(flown) = launcher.flown else {
@@ -89,7 +134,7 @@ pub fn fly(
         true => count_messages(&output.path().join("bag")),
         false => Ok(0),
     });
-    let ended = fleet.stop(&graph::FLIGHT_NODES);
+    let ended = fleet.stop(&graph::ALL_FLIGHT_NODES);
     drop(fleet);
     let (messages_recorded, unrecorded) = match recorded {
         Ok(count) => (count, None),
@@ -99,6 +144,8 @@ pub fn fly(
     let failure = watched.err().or(unrecorded).or(ended.err());
     let safe_mode = launcher.safe_mode.take();
     let model = mission.model()?;
+    let ground = ground(mission, &model, output)?;
+    output.write_ways(&ground.iter().flat_map(Ground::lines).collect::<Vec<_>>())?;
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
         decided_instead: made_instead(launcher.deciders.clone(), &mission.planner),
@@ -106,16 +153,23 @@ pub fn fly(
         seed: mission.seed,
         orbits: mission.orbits,
         ticks: flown.end.0,
-        wall_seconds: (flown.last - flown.began).as_secs_f64(),
+        wall_seconds: launcher.flown_before_s + (flown.last - flown.began).as_secs_f64(),
         requests: mission.initial_requests()?.0.len() as u64,
         accepted: launcher.accepted(),
         messages_recorded,
         nodes,
         orders: orders(output),
         resources: None,
-        link: None,
+        link: ground.map(|ground| LinkSummary::new(ground.lines(), model.period)),
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
+}
+
+/// The ground as the request manager left it, in a mission with a radio.
+fn ground(mission: &Mission, model: &Model, output: &OutputFolder) -> Result<Option<Ground>> {
+    let Some(mut end) = GroundEnd::new(mission, model)? else { return Ok(None) };
+    end.take_up(&Store::open_read_only(&output.path().join(STORE))?)?;
+    Ok(Some(end.into_ground()))
 }
 
 /// What became of orders, from the store that the request manager left.
@@ -188,10 +242,15 @@ fn start_nodes(
     };
     let store = format!("store:={}", text(&output.path().join(STORE))?);
     fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
-    for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
+    let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
+    let mut others = vec![(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")];
+    if wishes.radio {
+        peers.extend(graph::RADIO_NODES);
+        others.extend([(graph::CATALOGUE, "swath-catalogue"), (graph::LINK, "swath-link")]);
+    }
+    for (name, program) in others {
         fleet.start(name, program, &words(&[]))?;
     }
-    let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
     if wishes.record {
         peers.push(graph::RECORDER);
     }
@@ -217,11 +276,36 @@ fn count_messages(bag: &Path) -> Result<u64> {
     Ok(information.message_count)
 }
 
-/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`.
+/// The task of an attempt.
+fn record_of(attempt: &Attempt) -> TaskRecord {
+    let failure = match attempt.outcome {
+        AttemptOutcome::Succeeded => None,
+        AttemptOutcome::Failed(reason) => Some(reason),
+        AttemptOutcome::Cancelled => Some(FailureReason::Interrupted),
+    };
+    let (max_attitude_error, min_elevation) = (attempt.max_attitude_error, attempt.min_elevation);
+    TaskRecord {
+        task: attempt.task,
+        start: attempt.start,
+        end: attempt.end,
+        strip: Some(attempt.id),
+        t_pre: attempt.t_pre,
+        t_acq: attempt.t_acq,
+        outcome: TaskOutcome { failure, max_attitude_error, min_elevation },
+    }
+}
+
+/// Whether a node tells of its health that it does nothing because somebody told it to.
+fn rests(status: &DiagnosticStatus) -> bool {
+    let waits = [State::Unconfigured, State::Inactive].map(State::label);
+    status.name.ends_with(HEALTH) && status.values.iter().any(|it| it.key == STATE && waits.contains(&&*it.value))
+}
+
+/// What a node of a mission says of an alarm: `/NAMESPACE/NODE: ALARM`. Its health is none.
 fn report(tick: Tick, status: DiagnosticStatus) -> Option<Report> {
     let (node, name) = status.name.split_once(": ")?;
     let (_, node) = node.rsplit_once('/')?;
-    let key = graph::MEMBERS.contains(&node).then(|| Key::new(node, name))?;
+    let key = (graph::MEMBERS.contains(&node) && name != HEALTH).then(|| Key::new(node, name))?;
     let severity = if status.level == DiagnosticStatus::WARN { Severity::Warn } else { Severity::Error };
     Some(Report { tick, key, severity, wrong: status.level != DiagnosticStatus::OK, text: status.message })
 }
@@ -248,6 +332,18 @@ pub(super) struct Launcher {
     pub(super) paced: bool,
     pub(super) stamper: Stamper,
     pub(super) alarms: FlyingBoard,
+    /// When a node was last heard to rest because somebody told it to.
+    pub(super) resting: Option<Instant>,
+    keeping: Keeping,
+    /// When what is known of the flight was kept last.
+    kept_at: Option<Instant>,
+    /// Launchers before this one, and how long they flew [s of wall time].
+    epoch: u64,
+    flown_before_s: f64,
+    /// Whether a bag is recorded.
+    record: bool,
+    /// What was ordered up to this tick has befallen the recorder before this launcher.
+    pub(super) recorder_since: Tick,
     /// When something happened to alarms that is not in the journal's file yet.
     pub(super) unwritten: Option<Instant>,
     /// What is ordered to befall the mission.
@@ -273,7 +369,7 @@ pub(super) struct Reached {
 }
 
 impl Launcher {
-    fn start(mission: &Mission, ros: &RosArgs) -> Result<Self> {
+    fn start(mission: &Mission, ros: &RosArgs, keeping: Keeping, record: bool) -> Result<Self> {
         let node = Node::start(graph::LAUNCHER, ros)?;
         let model = mission.model()?;
         let stamper = Stamper::new(mission.epoch_unix_s, model.period);
@@ -294,6 +390,13 @@ impl Launcher {
             last_summary: None,
             paced: mission.pace > 0.0,
             alarms: FlyingBoard::new(&node, model.period, stamper.clone(), planned)?,
+            resting: None,
+            keeping,
+            kept_at: None,
+            epoch: 0,
+            flown_before_s: 0.0,
+            record,
+            recorder_since: Tick(0),
             unwritten: None,
             stamper,
             faults: mission.faults.clone(),
@@ -305,6 +408,50 @@ impl Launcher {
             room_since: None,
             model,
             node,
+        })
+    }
+
+    /// Goes on where the launcher before was.
+    fn take_up(&mut self, kept: KeptFlight, flown: &[TaskLine]) -> Result<()> {
+        self.recorder_since = kept.at;
+        self.recorder_faults.retain(|(it, _)| it.from > kept.at);
+        self.alarms.take_up(kept.reports, kept.wishes)?;
+        (self.epoch, self.flown_before_s) = (kept.epoch + 1, kept.flown_s);
+        (self.decided, self.deciders, self.safe_mode) = (kept.decided, kept.deciders, kept.safe_mode);
+        self.log = TaskLog::going_on(flown);
+        let now = Instant::now();
+        let end = Tick(flown.iter().map(|line| line.end_tick).max().unwrap_or(0));
+        self.flown = Some(Reached { end, began: now, last: now });
+        Ok(())
+    }
+
+    /// Learns from the store what was imaged while there was no launcher.
+    fn catch_up(&mut self, output: &mut OutputFolder) -> Result<()> {
+        let store = Store::open_read_only(&output.path().join(STORE))?;
+        for (attempt, name) in store.attempts_from(self.log.next())? {
+            self.log.flown(record_of(&attempt), &name);
+            self.log.settled(attempt.task, attempt.reward);
+        }
+        self.take_rest(output)
+    }
+
+    /// Keeps what another launcher must know.
+    fn keep(&mut self) -> Result<()> {
+        self.kept_at = Some(Instant::now());
+        let (reports, wishes) = self.alarms.kept();
+        let flown_s = self.flown.map_or(0.0, |flown| (flown.last - flown.began).as_secs_f64());
+        self.keeping.keep_flight(&KeptFlight {
+            epoch: self.epoch,
+            domain: self.node.environment().domain,
+            namespace: self.node.names().namespace().to_owned(),
+            record: self.record,
+            decided: self.decided,
+            deciders: self.deciders.clone(),
+            reports: reports.to_vec(),
+            wishes: wishes.to_vec(),
+            at: self.alarms.now().max(self.recorder_since),
+            safe_mode: self.safe_mode.clone(),
+            flown_s: self.flown_before_s + flown_s,
         })
     }
 
@@ -354,7 +501,12 @@ impl Launcher {
             self.take_rest(output)?;
             self.mind(fleet)?;
             self.mind_alarms(fleet, output)?;
-            if !self.paced && last_news.elapsed() > STALL_TIMEOUT {
+            if self.kept_at.is_none_or(|at| at.elapsed() > KEEP_EVERY) {
+                self.keep()?;
+            }
+            // A mission that somebody made wait has not stalled.
+            let stands = last_news.max(self.resting.unwrap_or(last_news)).elapsed();
+            if !self.paced && stands > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
             }
             self.node.wait(WAIT)?;
@@ -385,6 +537,9 @@ impl Launcher {
             let tick = self.stamper.tick_from(&array.header.stamp);
             for status in array.status {
                 tracing::debug!("{}: {}", status.name, status.message);
+                if rests(&status) {
+                    self.resting = Some(Instant::now());
+                }
                 report(tick, status).into_iter().for_each(|report| self.alarms.report(report));
             }
         }

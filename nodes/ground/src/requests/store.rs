@@ -77,8 +77,12 @@ impl StoreError {
 }
 
 /// Steps from each schema to the next; the first makes an empty file schema 1.
-const MIGRATIONS: [&str; 3] =
-    [include_str!("schema_1.sql"), include_str!("schema_2.sql"), include_str!("schema_3.sql")];
+const MIGRATIONS: [&str; 4] = [
+    include_str!("schema_1.sql"),
+    include_str!("schema_2.sql"),
+    include_str!("schema_3.sql"),
+    include_str!("schema_4.sql"),
+];
 /// How long a connection waits for another one's lock.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Pages that are copied in one step.
@@ -282,6 +286,9 @@ impl Store {
                 Entry::Attempted(attempt) => insert_attempt(&transaction, attempt)?,
                 // The changes that follow from it tell of it here.
                 Entry::Taken(_) => {}
+                Entry::Told(input) => {
+                    transaction.prepare_cached("INSERT INTO told (input) VALUES (?1)")?.execute([input])?;
+                }
             }
         }
         write_progress(&transaction, progress)?;
@@ -317,6 +324,17 @@ impl Store {
             progress: progress.unwrap_or_default(),
             last_settled: self.last_settled().map_err(sql)?,
         })
+    }
+
+    /// What the ground's end of the radio was told, in order.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn told(&self) -> Result<Vec<Vec<u8>>, StoreError> {
+        let sql = |source| self.error(source);
+        let mut statement = self.connection.prepare("SELECT input FROM told ORDER BY sequence").map_err(sql)?;
+        let inputs = statement.query_map([], |row| row.get(0)).map_err(sql)?;
+        inputs.collect::<Result<_, _>>().map_err(sql)
     }
 
     /// What turns the ticks of its mission into times.
@@ -399,6 +417,28 @@ impl Store {
             })
         });
         lines.map_err(sql)?.collect::<Result<_, _>>().map_err(sql)
+    }
+
+    /// The attempts of tasks from a number on, in order, each with its strip's name.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn attempts_from(&self, task: u64) -> Result<Vec<(Attempt, String)>, StoreError> {
+        let sql = |source| self.error(source);
+        let select = "SELECT DISTINCT request FROM attempts WHERE task >= ?1";
+        let mut statement = self.connection.prepare_cached(select).map_err(sql)?;
+        let ids = statement.query_map([task.cast_signed()], |row| row.get::<_, i64>(0)).map_err(sql)?;
+        let ids: Vec<StripId> =
+            ids.map(|id| id.map(|id| StripId(id.cast_unsigned()))).collect::<Result<_, _>>().map_err(sql)?;
+        let mut found = Vec::new();
+        for id in ids {
+            let name = "SELECT name FROM requests WHERE id = ?1";
+            let name: String = self.connection.query_row(name, [id.0.cast_signed()], |row| row.get(0)).map_err(sql)?;
+            let attempts = self.attempts(id)?.into_iter().filter(|attempt| attempt.task >= task);
+            found.extend(attempts.map(|attempt| (attempt, name.clone())));
+        }
+        found.sort_by_key(|(attempt, _)| attempt.task);
+        Ok(found)
     }
 
     /// The attempts at a request, in order.

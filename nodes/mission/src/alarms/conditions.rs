@@ -1,5 +1,6 @@
 //! What nodes report of conditions that follow from the mission itself, so that each flight of it reports the same.
 
+use serde::{Deserialize, Serialize};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::health::Health;
 
@@ -26,7 +27,7 @@ pub const STORE_FULL: &str = "store full";
 pub const BAG_FULL: &str = "bag full";
 
 /// A node says whether something is wrong.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// When.
     pub tick: Tick,

@@ -1,5 +1,6 @@
 //! What operators wish of alarms.
 
+use serde::{Deserialize, Serialize};
 use swath_sim::time::{Tick, TickPeriod};
 use thiserror::Error;
 
@@ -11,7 +12,8 @@ const SHELVE_MAX_S: f64 = 2_592_000.0;
 const TEXT_MAX: usize = 1000;
 
 /// What an operator wishes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Act {
     /// They know of it.
     Acknowledge,
@@ -22,7 +24,7 @@ pub enum Act {
 }
 
 /// What an operator wishes of an alarm.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Wish {
     /// When.
     pub tick: Tick,

@@ -114,6 +114,9 @@ pub enum Refusal {
         /// The step that is not there.
         illegal: IllegalTransition,
     },
+    /// The request manager rests.
+    #[error("the request manager is inactive: nothing is taken until it is activated")]
+    Inactive,
     /// There is no room where requests are kept.
     #[error("there is no room where requests are kept: nothing can be taken until there is some")]
     StoreFull,
@@ -142,7 +145,7 @@ impl Refusal {
             Self::Empty => Reason::Empty,
             Self::SameStrip { .. } => Reason::SameStrip,
             Self::Unknown { .. } | Self::UnknownReference { .. } => Reason::Unknown,
-            Self::State { .. } => Reason::State,
+            Self::State { .. } | Self::Inactive => Reason::State,
             Self::StoreFull => Reason::StoreFull,
             Self::Call { .. } | Self::Attempts { .. } => Reason::Call,
         }

@@ -14,10 +14,12 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 use super::logic::{Command, Effect, GuidanceLogic, Lost};
 use super::messages;
+use super::radio::RadioGate;
 use swath_mission::alarms::conditions::{back, of_health};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::PACED_PATIENCE;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{PACE, Program};
 
@@ -51,11 +53,11 @@ const PROGRAM: Program = Program {
 /// # Errors
 /// When the node cannot come up or DDS fails.
 pub fn run() -> Result<()> {
-    let mut node = GuidanceNode::new(MissionNode::start(&PROGRAM)?)?;
-    while !node.base.shutdown.asked() {
-        node.turn()?;
-    }
-    Ok(())
+    let base = MissionNode::start(&PROGRAM)?;
+    let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
+    let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, |base| GuidanceNode::new(base, pace))
 }
 
 struct GuidanceNode {
@@ -70,7 +72,12 @@ struct GuidanceNode {
     points: Publisher<msg::DecisionPoint>,
     status: Publisher<msg::GuidanceStatus>,
     phases: Publisher<msg::TaskPhase>,
-    aborts: Subscription<msg::TaskAbort>,
+    /// There is none where there is a radio.
+    aborts: Option<Subscription<msg::TaskAbort>>,
+    radio: Option<RadioGate>,
+    /// The last decision point, and how many launchers were told of it.
+    last_point: Option<msg::DecisionPoint>,
+    told_to: u64,
     /// Task and whether it images, as they were told last.
     phase_told: Option<(u64, bool)>,
     status_every: u64,
@@ -84,6 +91,10 @@ struct GuidanceNode {
     kept: Option<(u64, bool)>,
     /// Whether something was wrong with wheels or sensors before.
     health_told: bool,
+    /// States before are old.
+    since: Tick,
+    /// Whether it commanded nothing since it last flew.
+    rested: bool,
     base: MissionNode,
 }
 
@@ -95,18 +106,10 @@ struct Question {
 }
 
 impl GuidanceNode {
-    fn new(base: MissionNode) -> Result<Self> {
-        let mission = &base.mission;
-        let pace = Spec::new(PACE.name, mission.pace, PACE.about);
-        let pace = base.node.parameters().declare(pace.in_range(0.0..=1e6).read_only())?;
-        base.node.parameters().check_given()?;
+    fn new(base: MissionNode, pace: f64) -> Result<Self> {
         let period = base.model.period;
-        let hold = period.ticks_ceil(mission.hold_s);
-        let delay = period.ticks_ceil(mission.plant.planning_delay_s);
-        let logic = GuidanceLogic::new((*base.model).clone(), base.horizon, hold);
-        let logic = logic.with_planning_delay(delay).watching(mission.plant.noisy());
         let mut node = Self {
-            logic: take_up(&base, pace, logic)?,
+            logic: take_up(&base, pace)?,
             states: base.node.subscription(&graph::SPACECRAFT_STATE)?,
             truths: base.node.subscription(&graph::SPACECRAFT_TRUTH)?,
             unpaired: Default::default(),
@@ -115,7 +118,13 @@ impl GuidanceNode {
             points: base.node.publisher(&graph::DECISION_POINT)?,
             status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
             phases: base.node.publisher(&graph::TASK_PHASE)?,
-            aborts: base.node.subscription(&graph::TASK_ABORT)?,
+            aborts: match base.mission.link {
+                None => Some(base.node.subscription(&graph::TASK_ABORT)?),
+                Some(_) => None,
+            },
+            radio: RadioGate::new(&base, pace)?,
+            last_point: None,
+            told_to: 0,
             phase_told: None,
             status_every: u64::from(period.ticks_ceil(STATUS_PERIOD_S)).max(1),
             pace,
@@ -125,7 +134,9 @@ impl GuidanceNode {
             nobody_plans: Vec::new(),
             kept: None,
             // What the one before has told may be over.
-            health_told: base.node.epoch() > 0,
+            health_told: base.goes_on(),
+            since: base.stamper.tick_from(&base.node.clock().stamp()),
+            rested: false,
             base,
         };
         node.mind_faults();
@@ -149,19 +160,68 @@ impl GuidanceNode {
         self.logic.set_struck_at(self.base.strikes_at());
     }
 
-    fn turn(&mut self) -> Result<()> {
-        while let Some(message) = self.aborts.take()? {
-            if self.logic.on_abort(message.task) {
-                tracing::info!("task {} is given up: {}", message.task, message.reason);
-            }
+    fn work(&mut self) -> Result<Duration> {
+        self.tell_another_launcher()?;
+        while let Some(message) = self.next_abort()? {
+            self.give_up(message.task, &message.reason);
         }
+        self.listen()?;
         self.take_states()?;
+        while self.may_look()?
+            && let Some(state) = self.next_state()
+        {
+            let effects = self.logic.on_state(state);
+            self.tell_health()?;
+            self.carry_out(effects)?;
+        }
         while let Some(message) = self.tasks.take()? {
             self.take_task(&message)?;
         }
         let wait = self.mind_question()?;
-        self.base.wait(wait)?;
+        let patience = self.radio.as_ref().and_then(RadioGate::patience);
+        Ok(patience.map_or(wait, |patience| patience.min(wait)))
+    }
+
+    /// A launcher that takes over learns how far the mission is; the others only answer again.
+    fn tell_another_launcher(&mut self) -> Result<()> {
+        let launchers = self.base.node.taken_over();
+        if std::mem::replace(&mut self.told_to, launchers) != launchers
+            && let Some(point) = &self.last_point
+        {
+            self.points.publish(point)?;
+        }
         Ok(())
+    }
+
+    fn next_abort(&self) -> Result<Option<msg::TaskAbort>> {
+        Ok(self.aborts.as_ref().map_or(Ok(None), Subscription::take)?)
+    }
+
+    fn give_up(&mut self, task: u64, reason: &str) {
+        if self.logic.on_abort(task) {
+            tracing::info!("task {task} is given up: {reason}");
+        }
+    }
+
+    /// What was heard over the radio.
+    fn listen(&mut self) -> Result<()> {
+        while let Some(heard) = self.radio.as_mut().map_or(Ok(None), RadioGate::take)? {
+            if heard.abort {
+                self.give_up(heard.abort_task, &heard.reason);
+            }
+            if heard.hold && self.logic.wanted() == Some(heard.hold_task) {
+                let effects = self.logic.on_absence(u32::MAX);
+                self.carry_out(effects)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether there is a state, and the radio has been heard up to its tick, where there is one.
+    fn may_look(&mut self) -> Result<bool> {
+        let Some(tick) = self.unpaired.0.front().map(|state| state.tick) else { return Ok(false) };
+        let flown = self.logic.wanted().is_none().then(|| self.logic.flown());
+        self.radio.as_mut().map_or(Ok(true), |it| it.may_look(&self.base, tick, flown))
     }
 
     fn take_states(&mut self) -> Result<()> {
@@ -173,6 +233,8 @@ impl GuidanceNode {
         }
         while let Some(message) = self.states.take()? {
             match self.base.tick(message.tick).and_then(|_| state_sample(&message)) {
+                // A reader that comes late is sent what the writer still holds.
+                Ok(state) if state.tick < self.since => {}
                 Ok(state) => self.unpaired.0.push_back(state),
                 Err(error) => self.base.alarm(Severity::Error, "state refused", &error.to_string())?,
             }
@@ -180,24 +242,27 @@ impl GuidanceNode {
         if self.base.take_fault_orders()? {
             self.mind_faults();
         }
-        while let Some(mut state) = self.unpaired.0.pop_front() {
-            if state.tick >= self.base.truth_from() {
-                state.truth = self.unpaired.1.remove(&state.tick);
-                if state.truth.is_none() {
-                    // Truths come in order: one that has not come before a later one is lost, and so is its state.
-                    if self.unpaired.1.keys().next_back().is_some_and(|&last| last > state.tick) {
-                        continue;
-                    }
-                    self.unpaired.0.push_front(state);
-                    break;
-                }
-                self.unpaired.1.retain(|&tick, _| tick > state.tick);
-            }
-            let effects = self.logic.on_state(state);
-            self.tell_health()?;
-            self.carry_out(effects)?;
-        }
         Ok(())
+    }
+
+    /// The next state, once its truth is there, where there is one.
+    fn next_state(&mut self) -> Option<StateSample> {
+        while let Some(mut state) = self.unpaired.0.pop_front() {
+            if state.tick < self.base.truth_from() {
+                return Some(state);
+            }
+            state.truth = self.unpaired.1.remove(&state.tick);
+            if state.truth.is_some() {
+                self.unpaired.1.retain(|&tick, _| tick > state.tick);
+                return Some(state);
+            }
+            // Truths come in order: one that has not come before a later one is lost, and so is its state.
+            if self.unpaired.1.keys().next_back().is_none_or(|&last| last <= state.tick) {
+                self.unpaired.0.push_front(state);
+                return None;
+            }
+        }
+        None
     }
 
     /// Tells what came to be known of wheels and sensors; nothing as long as nothing was ever wrong.
@@ -246,6 +311,7 @@ impl GuidanceNode {
             format!("task {task} did not come within {} s: holding attitude for {hold} s", self.deadline.as_secs_f64());
         self.base.alarm(Severity::Warn, "planner late", &text)?;
         let effects = self.logic.on_deadline();
+        self.base.count("late_tasks", self.logic.late);
         self.carry_out(effects)?;
         Ok(Duration::ZERO)
     }
@@ -260,6 +326,7 @@ impl GuidanceNode {
                 Effect::Decide(point) => {
                     let message = messages::decision_point(&self.base.stamper, &point);
                     self.points.publish(&message)?;
+                    self.last_point = Some(message.clone());
                     let now = Instant::now();
                     self.question = (!point.mission_over).then_some(Question { message, asked: now, last_asked: now });
                     self.hold_without_planner(point.state.tick)?;
@@ -295,6 +362,8 @@ impl GuidanceNode {
     fn send(&mut self, command: &Command) -> Result<()> {
         self.base.set_now(command.tick);
         self.torques.publish(&messages::wheel_torque(&self.base.stamper, command))?;
+        let flown = self.logic.flown();
+        self.radio.as_mut().map_or(Ok(()), |it| it.answered(&self.base, command.tick, flown))?;
         let phase = (command.task, command.guidance.imaging);
         if command.has_strip && self.phase_told != Some(phase) {
             self.phase_told = Some(phase);
@@ -309,8 +378,63 @@ impl GuidanceNode {
     }
 }
 
+impl LifecycleNode for GuidanceNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn activate(&mut self) -> Result<()> {
+        if std::mem::take(&mut self.rested) {
+            // What was in hand counts as interrupted.
+            self.logic = fresh(&self.base).taking_up(self.logic.kept(), None);
+            (self.question, self.kept) = (None, None);
+            self.mind_faults();
+        }
+        Ok(())
+    }
+
+    fn deactivate(&mut self) -> Result<()> {
+        self.rested = true;
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        let wait = self.work()?;
+        self.base.wait(wait)?;
+        Ok(())
+    }
+
+    /// The wheels hold no torque. The last state waits for one who can end the mission.
+    fn rest(&mut self) -> Result<()> {
+        while self.next_abort()?.is_some() {}
+        while self.radio.as_mut().map_or(Ok(None), RadioGate::take)?.is_some() {}
+        while self.tasks.take()?.is_some() {}
+        self.take_states()?;
+        while self.unpaired.0.front().is_some_and(|state| state.tick < self.base.horizon)
+            && let Some(state) = self.next_state()
+        {
+            self.send(&self.logic.idle(state.tick))?;
+        }
+        self.base.wait(ASK_AGAIN_AFTER)?;
+        Ok(())
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        Ok(self.base)
+    }
+}
+
+/// Guidance that knows nothing of a flight yet.
+fn fresh(base: &MissionNode) -> GuidanceLogic {
+    let (mission, period) = (&base.mission, base.model.period);
+    GuidanceLogic::new((*base.model).clone(), base.horizon, period.ticks_ceil(mission.hold_s))
+        .with_planning_delay(period.ticks_ceil(mission.plant.planning_delay_s))
+        .watching(mission.plant.noisy())
+}
+
 /// Guidance where the one before was, if there was one.
-fn take_up(base: &MissionNode, pace: f64, logic: GuidanceLogic) -> Result<GuidanceLogic> {
+fn take_up(base: &MissionNode, pace: f64) -> Result<GuidanceLogic> {
+    let logic = fresh(base);
     let Some(text) = base.kept(KEPT)? else { return Ok(logic) };
     let kept = messages::kept(&text)?;
     tracing::info!("guidance goes on after task {}", kept.task);

@@ -8,6 +8,7 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::messages::decision_point::situation;
 use swath_node::messages::task_result::task_record;
 use swath_node::orders::{operator_action, planner_mode};
+use swath_ros::lifecycle::State;
 use swath_ros::{Publisher, Server, Spec, Subscription, graph};
 use swath_sim::planner::PlannerSpec;
 use swath_sim::time::Tick;
@@ -19,6 +20,7 @@ use swath_mission::approval::{ApprovalConfig, Gate, GatedPlanner, Mode};
 use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity, keep};
 use swath_node::program::{Parameter, Program};
 
@@ -49,11 +51,13 @@ const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// # Errors
 /// When the node cannot come up or DDS fails.
 pub fn run(policies: &Policies) -> Result<()> {
-    let mut node = PlannerNode::new(MissionNode::start(&PROGRAM)?, policies)?;
-    while !node.base.shutdown.asked() {
-        node.turn()?;
-    }
-    Ok(())
+    let base = MissionNode::start(&PROGRAM)?;
+    let name = Spec::new(PLANNER_PARAMETER.name, base.mission.planner.to_string(), PLANNER_PARAMETER.about);
+    let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
+    let mode = Spec::new(MODE.name, String::new(), MODE.about);
+    let mode = base.node.parameters().declare(mode.read_only())?;
+    base.node.parameters().check_given()?;
+    lifecycle::run(base, |base| PlannerNode::new(base, policies, &spec, &mode))
 }
 
 struct PlannerNode {
@@ -64,8 +68,8 @@ struct PlannerNode {
     decisions: Publisher<msg::Decision>,
     status: Publisher<msg::PlannerStatus>,
     actions: Publisher<msg::OperatorAction>,
-    set_mode: Server<msg::SetPlannerMode>,
-    review: Server<msg::ReviewProposal>,
+    /// There are none where there is a radio: nobody on the ground reaches the planner.
+    services: Option<(Server<msg::SetPlannerMode>, Server<msg::ReviewProposal>)>,
     status_told: Option<msg::PlannerStatus>,
     strips: Vec<msg::Candidate>,
     last: Option<msg::ImagingTask>,
@@ -78,14 +82,9 @@ struct PlannerNode {
 }
 
 impl PlannerNode {
-    fn new(base: MissionNode, policies: &Policies) -> Result<Self> {
-        let name = Spec::new(PLANNER_PARAMETER.name, base.mission.planner.to_string(), PLANNER_PARAMETER.about);
-        let spec: PlannerSpec = base.node.parameters().declare(name.read_only())?.parse()?;
-        let mode = Spec::new(MODE.name, String::new(), MODE.about);
-        let mode = base.node.parameters().declare(mode.read_only())?;
-        base.node.parameters().check_given()?;
-        let planner = GuardedPlanner::make(policies, &spec, base.mission.seed);
-        if let Some(warning) = policies.warning(&spec, &base.mission.sim) {
+    fn new(base: MissionNode, policies: &Policies, spec: &PlannerSpec, mode: &str) -> Result<Self> {
+        let planner = GuardedPlanner::make(policies, spec, base.mission.seed);
+        if let Some(warning) = policies.warning(spec, &base.mission.sim) {
             tracing::warn!("{warning}");
         }
         let config = ApprovalConfig { mode: mode_at_start(&base, mode)?, ..base.mission.approval.clone() };
@@ -95,8 +94,10 @@ impl PlannerNode {
             logic: PlannerLogic::new((*base.model).clone(), planner),
             status: base.node.publisher(&graph::PLANNER_STATUS)?,
             actions: base.node.publisher(&graph::PLANNER_ACTIONS)?,
-            set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
-            review: base.node.server(&graph::REVIEW_PROPOSAL)?,
+            services: match base.mission.link {
+                None => Some((base.node.server(&graph::SET_PLANNER_MODE)?, base.node.server(&graph::REVIEW_PROPOSAL)?)),
+                Some(_) => None,
+            },
             status_told: None,
             points: base.node.subscription(&graph::DECISION_POINT)?,
             upcoming: base.node.subscription(&graph::UPCOMING_STRIPS)?,
@@ -111,7 +112,7 @@ impl PlannerNode {
         })
     }
 
-    fn turn(&mut self) -> Result<()> {
+    fn work(&mut self) -> Result<()> {
         self.take_fault_orders()?;
         while let Some(point) = self.points.take()? {
             if point.mission_over {
@@ -154,9 +155,7 @@ impl PlannerNode {
             }
         }
         self.take_orders()?;
-        self.tell_status()?;
-        self.base.wait(IDLE)?;
-        Ok(())
+        self.tell_status()
     }
 
     fn take_fault_orders(&mut self) -> Result<()> {
@@ -168,29 +167,32 @@ impl PlannerNode {
 
     /// What operators say; it counts from the next decision on.
     fn take_orders(&mut self) -> Result<()> {
+        let Some((set_mode, review)) = &mut self.services else { return Ok(()) };
         let mut taken = Vec::new();
         let (at, initial) = (self.now, self.last.is_none());
         let mut note = |actor: String, act: Act| taken.push(Action { at, initial, actor, reason: String::new(), act });
         let mut set = None;
+        let inactive = (self.base.lifecycle.state() != State::Active).then(|| "the planner is inactive".to_owned());
         let gate = self.logic.gate_mut();
-        self.set_mode.answer_all(|call| match planner_mode(call.mode) {
-            Ok(mode) => {
+        set_mode.answer_all(|call| match (planner_mode(call.mode), &inactive) {
+            (_, Some(reason)) => msg::SetPlannerModeResponse { accepted: false, reason: reason.clone() },
+            (Ok(mode), None) => {
                 tracing::info!("{} sets the mode to {mode:?}", call.actor);
                 gate.set_mode(mode);
                 set = Some(mode);
                 note(call.actor, Act::SetMode(mode));
                 msg::SetPlannerModeResponse { accepted: true, reason: String::new() }
             }
-            Err(error) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
+            (Err(error), None) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
         })?;
-        self.review.answer_all(|call| match gate.review(call.proposal, call.approve, &call.actor) {
+        review.answer_all(|call| match inactive.clone().map_or_else(|| self::review(gate, &call), Err) {
             Ok(proposal) => {
                 let verb = if call.approve { "approves" } else { "rejects" };
                 tracing::info!("{} {verb} proposal {proposal}", call.actor);
                 note(call.actor, Act::Decide { proposal, approve: call.approve });
                 msg::ReviewProposalResponse { accepted: true, proposal, reason: String::new() }
             }
-            Err(error) => msg::ReviewProposalResponse { reason: error.to_string(), ..Default::default() },
+            Err(reason) => msg::ReviewProposalResponse { reason, ..Default::default() },
         })?;
         if let (Some(path), Some(mode)) = (self.base.keeps(KEPT), set) {
             keep(&path, &serde_json::to_string(&mode)?)?;
@@ -235,13 +237,43 @@ impl PlannerNode {
     }
 }
 
+impl LifecycleNode for PlannerNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        self.work()?;
+        self.base.wait(IDLE)?;
+        Ok(())
+    }
+
+    /// Nobody decides: the satellite holds its attitude.
+    fn rest(&mut self) -> Result<()> {
+        while self.points.take()?.is_some() {}
+        while self.upcoming.take()?.is_some() {}
+        self.take_fault_orders()?;
+        self.take_orders()?;
+        self.base.wait(IDLE)?;
+        Ok(())
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        Ok(self.base)
+    }
+}
+
+fn review(gate: &mut Gate, call: &msg::ReviewProposalRequest) -> Result<u64, String> {
+    gate.review(call.proposal, call.approve, &call.actor).map_err(|error| error.to_string())
+}
+
 /// When there is no planner, by order.
 fn away(base: &MissionNode) -> Vec<Scheduled> {
     base.mission.faults.of(Process::Planner, base.model.period).into_iter().map(|(it, _)| it).collect()
 }
 
 /// The mode that is asked for, else the one that operators set before this planner was started again, else the mission's.
-fn mode_at_start(base: &MissionNode, asked_for: String) -> Result<Mode> {
+fn mode_at_start(base: &MissionNode, asked_for: &str) -> Result<Mode> {
     let text = if asked_for.is_empty() { base.kept(KEPT)? } else { Some(format!("\"{asked_for}\"")) };
     let Some(text) = text else { return Ok(base.mission.approval.mode) };
     serde_json::from_str(&text).with_context(|| format!("{text} is not a mode: autonomous, approve or hold"))

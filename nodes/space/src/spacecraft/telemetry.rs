@@ -5,7 +5,7 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use swath_msgs::geometry_msgs::{Quaternion, Transform, TransformStamped};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix, NavSatStatus};
 use swath_msgs::tf2_msgs::TFMessage;
-use swath_ros::{Publisher, Spec, graph};
+use swath_ros::{Parameters, Publisher, Spec, graph};
 use swath_sim::vehicle::mrp;
 use swath_sim::world::frames::latitude_longitude_deg;
 
@@ -30,13 +30,21 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
+    /// Declares how often.
+    ///
+    /// # Errors
+    /// When the value given is out of range.
+    pub fn declare(parameters: &Parameters) -> Result<()> {
+        let period = Spec::new(PERIOD.name, PERIOD_S, PERIOD.about);
+        parameters.declare(period.in_range(0.1..=3600.0))?;
+        Ok(())
+    }
+
     /// Telemetry every `telemetry_period_s` of simulated time, as that is set at the moment.
     ///
     /// # Errors
-    /// When the parameter is out of range or DDS fails.
+    /// When DDS fails.
     pub fn new(base: &MissionNode) -> Result<Self> {
-        let period = Spec::new(PERIOD.name, PERIOD_S, PERIOD.about);
-        base.node.parameters().declare(period.in_range(0.1..=3600.0))?;
         Ok(Self {
             frames: base.node.publisher(&graph::TF)?,
             wheels: base.node.publisher(&graph::WHEELS)?,

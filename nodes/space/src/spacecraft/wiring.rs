@@ -7,7 +7,7 @@ use anyhow::Result;
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
 use swath_node::messages::spacecraft_state::spacecraft_state;
-use swath_ros::{Publisher, Spec, Subscription, graph};
+use swath_ros::{Publisher, RosError, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 
 use super::journal::Journal;
@@ -18,6 +18,7 @@ use swath_mission::alarms::conditions::back;
 use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::Process;
 use swath_mission::file::PACED_PATIENCE;
+use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity};
 use swath_node::program::{PACE, Parameter, Program};
 use swath_sim::vehicle::spacecraft::StateSample;
@@ -28,6 +29,10 @@ const RESEND_AFTER: Duration = Duration::from_millis(300);
 const RESEND_SOON_AFTER: Duration = Duration::from_millis(20);
 /// How long the last messages may take to reach their readers.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long the last state may take when the process is asked to end in flight.
+const LAST_FLUSH: Duration = Duration::from_millis(300);
+/// How long others are waited for before it is looked whether something else is to be done.
+const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// In a paced mission, how long a late command is waited for where ticks are shorter than that.
 const COMMAND_PATIENCE: Duration = PACED_PATIENCE.saturating_mul(2);
 /// States that may be without an answer: two ticks are under way at once.
@@ -51,10 +56,44 @@ const PROGRAM: Program = Program {
 /// When the node cannot come up, a peer is missing, or DDS fails.
 pub fn run() -> Result<()> {
     let base = MissionNode::start(&PROGRAM)?;
-    let mut spacecraft = SpacecraftNode::new(base)?;
-    spacecraft.wait_for_peers()?;
-    spacecraft.fly()?;
-    spacecraft.linger()
+    let settings = Settings::declare(&base)?;
+    lifecycle::run(base, |base| SpacecraftNode::new(base, settings.clone()))
+}
+
+/// Its own parameters.
+#[derive(Clone)]
+struct Settings {
+    pace: f64,
+    peers: Vec<String>,
+    peer_timeout: Duration,
+}
+
+impl Settings {
+    fn declare(base: &MissionNode) -> Result<Self> {
+        let parameters = base.node.parameters();
+        let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
+        let pace = parameters.declare(pace.in_range(0.0..=1e6).read_only())?;
+        let peers = "guidance,request_manager,planner".to_owned();
+        let peers = Spec::new(WAIT_FOR.name, peers, WAIT_FOR.about);
+        let peers: String = parameters.declare(peers.read_only())?;
+        let peers = peers.split(',').filter(|peer| !peer.is_empty()).map(str::to_owned).collect();
+        let timeout = Spec::new(PEER_TIMEOUT.name, 20.0, PEER_TIMEOUT.about);
+        let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
+        Telemetry::declare(parameters)?;
+        parameters.check_given()?;
+        Ok(Self { pace, peers, peer_timeout: Duration::from_secs_f64(timeout) })
+    }
+}
+
+/// What a spacecraft is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Others must be there before time begins; since when it waits.
+    Waits { since: Instant },
+    /// Time passes.
+    Flies,
+    /// The last state is told.
+    Lingers,
 }
 
 struct SpacecraftNode {
@@ -70,24 +109,18 @@ struct SpacecraftNode {
     unanswered: VecDeque<StateSample>,
     /// There is one where somebody would start the spacecraft again.
     journal: Option<Journal>,
-    pace: f64,
-    peers: Vec<String>,
-    peer_timeout: Duration,
+    stage: Stage,
+    /// When a tick was flown, or a state sent again, last.
+    progress: Instant,
+    /// In a paced mission, when the next tick is due, and until when its command is waited for.
+    due: Instant,
+    latest: Instant,
+    settings: Settings,
     base: MissionNode,
 }
 
 impl SpacecraftNode {
-    fn new(mut base: MissionNode) -> Result<Self> {
-        let parameters = base.node.parameters();
-        let pace = Spec::new(PACE.name, base.mission.pace, PACE.about);
-        let pace = parameters.declare(pace.in_range(0.0..=1e6).read_only())?;
-        let peers = "guidance,request_manager,planner".to_owned();
-        let peers = Spec::new(WAIT_FOR.name, peers, WAIT_FOR.about);
-        let peers = parameters.declare(peers.read_only())?.split(',').map(str::to_owned).collect();
-        let timeout = Spec::new(PEER_TIMEOUT.name, 20.0, PEER_TIMEOUT.about);
-        let timeout = parameters.declare(timeout.in_range(0.1..=3600.0).read_only())?;
-        let telemetry = Telemetry::new(&base)?;
-        parameters.check_given()?;
+    fn new(mut base: MissionNode, settings: Settings) -> Result<Self> {
         let orders = OrderDesk::new(&mut base)?;
         let mut logic = SpacecraftLogic::new(base.mission.spacecraft(&base.model)?, base.horizon);
         logic.set_without_guidance(without_guidance(&base));
@@ -100,30 +133,56 @@ impl SpacecraftNode {
             states: base.node.publisher(&graph::SPACECRAFT_STATE)?,
             truths: base.node.publisher(&graph::SPACECRAFT_TRUTH)?,
             commands: base.node.subscription(&graph::WHEEL_TORQUE)?,
-            telemetry,
+            telemetry: Telemetry::new(&base)?,
             orders,
             resend_after: resend_after(&base),
-            pace,
-            peers,
-            peer_timeout: Duration::from_secs_f64(timeout),
+            stage: Stage::Waits { since: Instant::now() },
+            progress: Instant::now(),
+            due: Instant::now(),
+            latest: Instant::now(),
+            settings,
             base,
         })
     }
 
-    fn wait_for_peers(&self) -> Result<()> {
-        let peers: Vec<&str> = self.peers.iter().map(String::as_str).filter(|peer| !peer.is_empty()).collect();
-        Ok(self.base.node.wait_for_peers(&peers, self.peer_timeout)?)
-    }
-
-    fn fly(&mut self) -> Result<()> {
+    /// Begins when everybody is there, and says for whom it waits until then.
+    fn wait_for_peers(&mut self, since: Instant) -> Result<()> {
+        let Settings { peers, peer_timeout, .. } = &self.settings;
+        let peers: Vec<&str> = peers.iter().map(String::as_str).collect();
+        match self.base.node.wait_for_peers(&peers, LOOK_AGAIN.min(*peer_timeout)) {
+            Ok(()) if self.base.shutdown.asked() => return Ok(()),
+            Ok(()) => {}
+            Err(RosError::MissingPeers { missing, .. }) if since.elapsed() < *peer_timeout => {
+                self.base.tell_missing(missing);
+                return self.base.tell_of_itself();
+            }
+            Err(RosError::MissingPeers { missing, .. }) => {
+                return Err(RosError::MissingPeers { waited: *peer_timeout, missing }.into());
+            }
+            Err(error) => return Err(error.into()),
+        }
         self.resend()?;
         let first = self.logic.sample();
         self.publish(&first)?;
-        if self.pace > 0.0 {
-            self.fly_paced()?
-        } else {
-            self.fly_in_lockstep()?
-        }
+        self.stage = Stage::Flies;
+        self.set_out();
+        Ok(())
+    }
+
+    /// Time begins to pass, or goes on.
+    fn set_out(&mut self) {
+        self.progress = Instant::now();
+        self.due = self.progress + self.tick();
+        self.latest = self.due.max(self.progress + COMMAND_PATIENCE);
+    }
+
+    /// How long a tick takes in a paced mission.
+    fn tick(&self) -> Duration {
+        let pace = self.settings.pace;
+        if pace > 0.0 { Duration::from_secs_f64(self.base.model.period.seconds() / pace) } else { Duration::ZERO }
+    }
+
+    fn tell_missed(&self) -> Result<()> {
         if self.logic.missed > 0 {
             let text = format!("{} ticks were flown without a command", self.logic.missed);
             self.base.alarm(Severity::Warn, "late commands", &text)?;
@@ -131,25 +190,33 @@ impl SpacecraftNode {
         Ok(())
     }
 
+    /// The last state is the one that ends the mission: it must arrive.
+    fn arrive(&mut self) -> Result<()> {
+        self.tell_missed()?;
+        let (states, clock) = (self.states.flush(FLUSH_TIMEOUT), self.clock.flush(FLUSH_TIMEOUT));
+        if !(states && clock) {
+            tracing::warn!("not every reader has the last state and time");
+        }
+        self.stage = Stage::Lingers;
+        Ok(())
+    }
+
     /// As fast as the nodes can go: a tick is integrated when its command has come.
     fn fly_in_lockstep(&mut self) -> Result<()> {
-        let mut progress = Instant::now();
-        while !self.logic.done() && !self.base.shutdown.asked() {
-            self.take_commands()?;
-            self.take_orders()?;
-            let before = self.logic.now();
-            while self.logic.ready() && !self.logic.done() {
-                self.advance()?;
-            }
-            if self.logic.now() > before {
-                progress = Instant::now();
-            } else if progress.elapsed() > self.resend_after {
-                self.resend()?;
-                progress = Instant::now();
-            }
-            if !self.logic.ready() {
-                self.base.wait(self.resend_after)?;
-            }
+        self.take_commands()?;
+        self.take_orders()?;
+        let before = self.logic.now();
+        while self.logic.ready() && !self.logic.done() {
+            self.advance()?;
+        }
+        if self.logic.now() > before {
+            self.progress = Instant::now();
+        } else if self.progress.elapsed() > self.resend_after {
+            self.resend()?;
+            self.progress = Instant::now();
+        }
+        if !self.logic.ready() {
+            self.base.wait(self.resend_after)?;
         }
         Ok(())
     }
@@ -158,30 +225,23 @@ impl SpacecraftNode {
     ///
     /// Where ticks are shorter than a decision may take, a late command is waited for, and the time lost is made up.
     fn fly_paced(&mut self) -> Result<()> {
-        let tick = Duration::from_secs_f64(self.base.model.period.seconds() / self.pace);
-        let mut due = Instant::now() + tick;
-        let mut latest = due.max(Instant::now() + COMMAND_PATIENCE);
-        let mut told = Instant::now();
-        while !self.logic.done() && !self.base.shutdown.asked() {
-            self.take_commands()?;
-            self.take_orders()?;
-            let now = Instant::now();
-            let wanted = if self.logic.ready() { due } else { latest };
-            if now < wanted {
-                if !self.logic.ready() && told.elapsed() >= RESEND_SOON_AFTER {
-                    self.resend()?;
-                    told = Instant::now();
-                }
-                let left = wanted - now;
-                self.base.wait(if self.logic.ready() { left } else { left.min(RESEND_SOON_AFTER) })?;
-                continue;
+        self.take_commands()?;
+        self.take_orders()?;
+        let now = Instant::now();
+        let wanted = if self.logic.ready() { self.due } else { self.latest };
+        if now < wanted {
+            if !self.logic.ready() && self.progress.elapsed() >= RESEND_SOON_AFTER {
+                self.resend()?;
+                self.progress = Instant::now();
             }
-            told = now;
-            due += tick;
-            latest = due.max(now + COMMAND_PATIENCE);
-            self.advance()?;
+            let left = wanted - now;
+            self.base.wait(if self.logic.ready() { left } else { left.min(RESEND_SOON_AFTER) })?;
+            return Ok(());
         }
-        Ok(())
+        self.due += self.tick();
+        self.latest = self.due.max(now + COMMAND_PATIENCE);
+        self.progress = now;
+        self.advance()
     }
 
     fn advance(&mut self) -> Result<()> {
@@ -195,6 +255,7 @@ impl SpacecraftNode {
             journal.add(&command)?;
         }
         let sample = self.logic.advance_by(&command);
+        self.base.count("missed_ticks", self.logic.missed);
         self.publish(&sample)
     }
 
@@ -243,19 +304,49 @@ impl SpacecraftNode {
     fn resend(&self) -> Result<()> {
         self.unanswered.iter().try_for_each(|sample| self.tell(sample))
     }
+}
 
-    fn linger(&mut self) -> Result<()> {
-        let (states, clock) = (self.states.flush(FLUSH_TIMEOUT), self.clock.flush(FLUSH_TIMEOUT));
-        if !(states && clock) {
-            tracing::warn!("not every reader has the last state and time");
+impl LifecycleNode for SpacecraftNode {
+    fn base(&self) -> &MissionNode {
+        &self.base
+    }
+
+    fn activate(&mut self) -> Result<()> {
+        self.set_out();
+        Ok(())
+    }
+
+    fn turn(&mut self) -> Result<()> {
+        match self.stage {
+            Stage::Waits { since } => return self.wait_for_peers(since),
+            Stage::Flies if self.settings.pace > 0.0 => self.fly_paced()?,
+            Stage::Flies => self.fly_in_lockstep()?,
+            Stage::Lingers => {
+                self.base.wait(FLUSH_TIMEOUT)?;
+                while self.commands.take()?.is_some() {}
+                self.take_orders()?;
+            }
         }
-        while !self.base.shutdown.asked() {
-            self.base.wait(FLUSH_TIMEOUT)?;
-            // The last state is the one that ends the mission: it must arrive.
-            while self.commands.take()?.is_some() {}
-            self.take_orders()?;
+        if self.stage == Stage::Flies && self.logic.done() {
+            self.arrive()?;
         }
         Ok(())
+    }
+
+    /// The clock stands.
+    fn rest(&mut self) -> Result<()> {
+        self.take_commands()?;
+        self.take_orders()?;
+        self.base.wait(FLUSH_TIMEOUT)?;
+        Ok(())
+    }
+
+    fn end(self) -> Result<MissionNode> {
+        if self.stage == Stage::Flies {
+            self.tell_missed()?;
+            let _ = self.states.flush(LAST_FLUSH);
+        }
+        Ok(self.base)
     }
 }
 
@@ -280,7 +371,7 @@ fn take_up(
     mut logic: SpacecraftLogic,
 ) -> Result<(Option<Journal>, VecDeque<StateSample>, SpacecraftLogic)> {
     let Some(path) = base.keeps(JOURNAL) else { return Ok((None, VecDeque::new(), logic)) };
-    let (journal, flown) = Journal::open(&path, base.node.epoch() > 0)?;
+    let (journal, flown) = Journal::open(&path, base.goes_on())?;
     let mut before = None;
     for command in &flown {
         before = Some(logic.sample());
