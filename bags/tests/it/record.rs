@@ -337,7 +337,7 @@ fn a_full_disk_ends_recording_with_an_alarm_and_a_readable_bag() {
         std::thread::sleep(Duration::from_millis(1));
     }
     let (status, _) = recorder.end();
-    assert_eq!(status.code(), Some(1));
+    assert_eq!(status.code(), Some(4));
     wait_until("the alarm has come", || {
         alarm = alarm.max(worst(&diagnostics));
         alarm == DiagnosticStatus::ERROR

@@ -196,9 +196,9 @@ mod tests {
         assert!(Running::take_over(Name { started: name.started + 1, ..name }, &signs).unwrap().is_none());
         let mut left = Running::take_over(name, &signs).unwrap().unwrap();
         assert!(left.ended().unwrap().is_none());
-        left.send(Signal::INT).unwrap();
+        left.send(Signal::TERM).unwrap();
         let Ending::Known(status) = child.stop().unwrap() else { panic!("a child's end is known") };
-        assert_eq!(status.signal(), Some(2));
+        assert_eq!(status.signal(), Some(15));
         assert!(matches!(left.ended().unwrap(), Some(Ending::Gone)));
         left.send(Signal::KILL).unwrap();
         assert!(Running::take_over(name, &signs).unwrap().is_none());

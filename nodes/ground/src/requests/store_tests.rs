@@ -178,7 +178,7 @@ fn a_store_of_the_first_schema_is_brought_up_to_date() {
     let version: i64 = raw.query_row("PRAGMA user_version", [], |row| row.get(0)).unwrap();
     let index = "SELECT COUNT(*) FROM sqlite_master WHERE name = 'changes_of_request'";
     let count: i64 = raw.query_row(index, [], |row| row.get(0)).unwrap();
-    assert_eq!((version, count), (3, 1));
+    assert_eq!((version, count), (4, 1));
 }
 
 /// As when one is stopped, replaced, and goes on.

@@ -452,6 +452,8 @@ fn reasons_of_a_bad_day() -> BTreeSet<Reason> {
     refused.push(submit(&mut logic, equatorial("b", 10.0)).unwrap_err());
     refused.push(logic.cancel(StripId(99), "ops", "").unwrap_err());
     refused.push(logic.review(id, Review::Release, "ops", "").unwrap_err());
+    // The request manager's node says this one, which has a disk.
+    refused.push(Refusal::StoreFull);
     logic.on_task(chosen(0, id));
     logic.on_decision_point(1, Tick(300), &[]);
     let went_wrong =
