@@ -154,7 +154,7 @@ impl SpacecraftNode {
             Ok(()) => {}
             Err(RosError::MissingPeers { missing, .. }) if since.elapsed() < *peer_timeout => {
                 self.base.tell_missing(missing);
-                return Ok(self.base.tell_of_itself()?);
+                return self.base.tell_of_itself();
             }
             Err(RosError::MissingPeers { missing, .. }) => {
                 return Err(RosError::MissingPeers { waited: *peer_timeout, missing }.into());
