@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
 #[path = "common/flight.rs"]
+#[allow(dead_code, reason = "others use more of it")]
 mod flight;
 #[path = "common/server.rs"]
 mod server;

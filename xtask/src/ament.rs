@@ -10,8 +10,17 @@ use anyhow::{Context, Result};
 const PACKAGE: &str = "swath";
 
 /// The programs of the package, as cargo builds them.
-const PROGRAMS: &[&str] =
-    &["swath", "swath-bag", "swath-guidance", "swath-planner", "swath-requests", "swath-spacecraft"];
+const PROGRAMS: &[&str] = &[
+    "swath",
+    "swath-bag",
+    "swath-catalogue",
+    "swath-console",
+    "swath-guidance",
+    "swath-link",
+    "swath-planner",
+    "swath-requests",
+    "swath-spacecraft",
+];
 
 /// Lays out the folder `prefix` as ament has it: programs as links to those in `programs`, everything else copied from
 /// the repository `root`.

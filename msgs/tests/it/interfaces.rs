@@ -54,6 +54,12 @@ fn type_hashes_are_those_of_ros_2() {
         ("swath_msgs/msg/StandingAlarms", "73fcc18a42bdcf338356ef212b5d62b8a7bbc7687c52759ecc5c2a2ded7e6079"),
         ("swath_msgs/msg/AlarmEvent", "34c0791c3ef9652609ec8b24ed54fe5cda353bbc0411eb92cc67edb5d80601ba"),
         ("swath_msgs/msg/UpcomingStrips", "85f1f6c705dd469a2336343601f3c88e50235420c6d1857e61fa7d695185ed23"),
+        ("swath_msgs/msg/RadioTurn", "0d5ae29134beb6cca4c232ec639711d9c75f5b7c9f4cd5e338a61bb536422d0e"),
+        ("swath_msgs/msg/RadioSent", "e50156d72018b015195c9a477934b47981b1d37db532dc2571e933d4518f1829"),
+        ("swath_msgs/msg/CatalogueHeard", "c65b2c6553479c4c9a2f76cbf73a55ca122911fb83e26deeac5d0a3bb20b78d2"),
+        ("swath_msgs/msg/GuidanceReached", "c8d07605150eb9370beaeb5485879bf9a913b7efc0ec53d0a23883df4ab10dd9"),
+        ("swath_msgs/msg/LinkStatus", "13dd719b2832603116f9dfc6e4be46de48c1f6400cbfc463ca43c241425356d4"),
+        ("swath_msgs/msg/StripWay", "f9e517e537390d35fc1d46ad9a4b77c3541255f0d3f0de65e29a4c80f03202f8"),
     ] {
         assert_eq!(type_hash_for(type_name), Some(format!("RIHS01_{hash}").as_str()), "{type_name}");
     }

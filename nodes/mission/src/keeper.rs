@@ -138,7 +138,7 @@ impl Keeper {
             _ = ground.ask(Action { at: Tick(0), initial: true, actor, reason, act }, Tick(0));
         }
         let space = Catalogue::new(requests, down, radio.config(), model.period);
-        let mut apart = Apart::new(ground, space, radio, origin);
+        let mut apart = Apart::new(ground, space, radio);
         apart.will_be_asked(actions, absences);
         Ok(Self::Apart(Box::new(apart)))
     }

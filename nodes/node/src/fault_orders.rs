@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use swath_mission::faults::orders::Ordered;
 use swath_msgs::swath_msgs as msg;
-use swath_ros::{Node, Subscription, graph};
+use swath_ros::Subscription;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 
@@ -12,25 +12,6 @@ use crate::stamp::Stamper;
 
 /// The file in which the spacecraft keeps what was ordered, for all nodes that are started again.
 const KEPT: &str = "fault_orders.json";
-
-/// What a node knows of orders.
-pub(crate) struct FaultOrders {
-    /// There are none for the spacecraft, which takes them.
-    messages: Option<Subscription<msg::FaultOrders>>,
-    /// First tick whose state is told as it is, beside what is measured of it.
-    truth_from: Tick,
-}
-
-impl FaultOrders {
-    /// What a node of this name hears; `told` is whether the truth is told apart from the start.
-    pub(crate) fn new(node: &Node, name: &str, told: bool) -> Result<Self> {
-        let hears = graph::FAULT_ORDERS.entry.readers.contains(&name);
-        Ok(Self {
-            messages: hears.then(|| node.subscription(&graph::FAULT_ORDERS)).transpose()?,
-            truth_from: if told { Tick(0) } else { FOR_GOOD },
-        })
-    }
-}
 
 impl MissionNode {
     /// Adds what was ordered before this node was started again to its mission, and returns it.

@@ -7,6 +7,7 @@ pub mod lifecycle;
 pub mod messages;
 pub mod node;
 pub mod orders;
+mod orders_heard;
 pub mod out;
 pub mod program;
 pub mod stamp;

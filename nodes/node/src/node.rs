@@ -17,8 +17,8 @@ use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
 use crate::error::MessageError;
-use crate::fault_orders::FaultOrders;
 use crate::health::{HEALTH, Health, Known};
+use crate::orders_heard::FaultOrders;
 use crate::out;
 use crate::program::{AUTOSTART, MISSION, Program};
 use crate::stamp::Stamper;
@@ -97,9 +97,6 @@ impl MissionNode {
             bail!("parameter `mission` is not set: give --ros-args -p mission:=FILE");
         }
         let mission = Mission::read(&path)?;
-        if mission.link.is_some() {
-            bail!("a mission with [link] flies in one process only: swath launch {} --in-process", path.display());
-        }
         let model = Arc::new(mission.model()?);
         let autostart = Spec::new(AUTOSTART.name, true, AUTOSTART.about).read_only();
         let autostart = node.parameters().declare(autostart)?;

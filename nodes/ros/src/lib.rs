@@ -65,6 +65,7 @@ mod replies;
 mod roster;
 mod rtps;
 mod screen;
+pub mod segment;
 mod service;
 mod shutdown;
 mod signal;

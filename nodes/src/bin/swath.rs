@@ -1,8 +1,9 @@
 //! The operator's command line.
 
-use std::process::ExitCode;
+use std::os::unix::process::CommandExt as _;
+use std::process::{self, ExitCode};
 
-use anyhow::{Error, Result};
+use anyhow::{Error, Result, anyhow};
 use clap::{Parser, Subcommand};
 use swath_ground::debrief::{export, refly, report};
 use swath_ground::{launch, operate, passes};
@@ -28,6 +29,8 @@ enum Command {
     Planner(operate::PlannerArgs),
     /// Say what is wrong, and what operators know of it.
     Alarms(operate::AlarmsArgs),
+    /// Say how the radio of a flying mission stands.
+    Link(operate::LinkArgs),
     /// Let a wheel, a sensor or a node of a flying mission fail, as a drill or a test.
     Fault(operate::FaultArgs),
     /// Say when stations see the satellite of a mission, from its file alone.
@@ -54,15 +57,27 @@ fn main() -> ExitCode {
     })
 }
 
+/// Becomes the console's own program, with the words that this one was given; returns only what kept it from that.
+fn become_console() -> Error {
+    let program = match std::env::current_exe() {
+        Ok(path) => path.with_file_name("swath-console"),
+        Err(error) => return anyhow!("cannot find swath-console: {error}"),
+    };
+    let words = std::env::args_os().skip_while(|word| *word != "console").skip(1);
+    let error = process::Command::new(&program).args(words).exec();
+    anyhow!("cannot run {}: {error}", program.display())
+}
+
 fn run(command: Command, ros: &RosArgs) -> Result<ExitCode> {
     match command {
         Command::Launch(args) => return launch::run(&args, ros, &POLICIES),
         Command::Strips(args) => operate::run_strips(&args, ros)?,
         Command::Planner(args) => operate::run_planner(&args, ros)?,
         Command::Alarms(args) => operate::run_alarms(&args, ros)?,
+        Command::Link(args) => operate::run_link(&args, ros)?,
         Command::Fault(args) => operate::run_fault(&args, ros)?,
         Command::Passes(args) => passes::run(&args)?,
-        Command::Console(args) => swath_console::run(&args, ros)?,
+        Command::Console(_) => return Err(become_console()),
         Command::Bridge(args) => swath_bridge::run(&args, ros)?,
         Command::Refly(args) => return args.run(&POLICIES),
         Command::Report(args) => return args.run(),

@@ -26,6 +26,7 @@ mod operators_day;
 mod parity;
 mod peer;
 mod pins;
+mod radio;
 mod readme;
 mod recorded;
 mod start_and_end;

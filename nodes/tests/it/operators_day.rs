@@ -46,6 +46,56 @@ fn documented() -> Vec<String> {
     document.lines().filter_map(|line| line.strip_prefix("$ swath ")).map(str::to_owned).collect()
 }
 
+/// The same wishes over three stations; faster than the document has it.
+fn a_night_over_the_radio(day: &Day, out: &Path, done: &mut Vec<String>) {
+    let mut note = |words: &str| done.push(words.to_owned());
+    note("launch examples/missions/passes.toml --pace 60");
+    let mut launch = day.command("launch examples/missions/passes.toml --pace 150");
+    let mut flight = common::Running::start(launch.arg("--out").arg(out));
+    note("link status");
+    let status = || day.json("link status").remove(0);
+    let waiting = common::until("the link's status", || status()["waiting"]["orders"].as_u64().filter(|it| *it > 1000));
+    assert_eq!(status()["passes"][0]["station"], "punta-arenas");
+    note("strips preview examples/requests/fires.geojson");
+    // Some of the fires have no chance in this mission, so that both commands exit with 1.
+    let lines = |words: &str| {
+        let output = common::run(&mut day.command(&format!("{words} --json")));
+        common::json_lines(&String::from_utf8(output.stdout).unwrap())
+    };
+    let chances = lines("strips preview examples/requests/fires.geojson");
+    let first = chances.iter().map(|it| &it["over_the_radio"]).find(|it| it["known"].is_string()).unwrap();
+    let time = |step: &str| first[step].as_str().unwrap().to_owned();
+    assert!(time("uplink") < time("imaged") && time("imaged") < time("known"), "{first}");
+    note("strips submit examples/requests/fires.geojson");
+    let fires = lines("strips submit examples/requests/fires.geojson");
+    let fires: Vec<u64> = fires.iter().filter_map(|it| it["id"].as_u64()).filter(|id| *id > 0).collect();
+    assert!(status()["waiting"]["orders"].as_u64().unwrap() > waiting, "{fires:?}");
+    note("strips list --limit 0");
+    let way = |id: u64| {
+        let strips = day.json("strips list --limit 0");
+        strips.into_iter().find(|strip| strip["id"] == id).unwrap()["way"].clone()
+    };
+    assert!(way(fires[0])["queued"].is_object() && way(fires[0])["uplinked"].is_null());
+    common::until("the first fire on board", || way(fires[0])["acknowledged"].is_object().then_some(()));
+    note("strips watch --count 3");
+    assert_eq!(day.json("strips watch --count 3").len(), 3);
+    note("strips show 1501");
+    let steps = day.show(fires[0])["way"].clone();
+    let tick = |step: &str| steps[step]["tick"].as_u64().unwrap();
+    assert!(tick("queued") < tick("uplinked") && tick("uplinked") < tick("on_board"), "{steps}");
+    assert!(tick("on_board") < tick("acknowledged"), "{steps}");
+    note("strips cancel 1502");
+    // One that is not imaged before the cancel is on board.
+    let accepted = day.json("strips list --state accepted --limit 0");
+    let late = accepted.iter().max_by_key(|it| it["window_open"].as_str().unwrap_or_default()).unwrap();
+    let last = late["id"].as_u64().unwrap();
+    day.swath(&format!("strips cancel {last} --reason cloud"));
+    common::until("the answer to it", || (day.show(last)["status"]["state"] == "cancelled by user").then_some(()));
+    flight.stop();
+    let ways = std::fs::read_to_string(out.join("strips.jsonl")).unwrap();
+    assert!(ways.lines().count() > 1000);
+}
+
 #[test]
 fn an_operators_day() {
     let folder = tempfile::tempdir().unwrap();
@@ -194,6 +244,8 @@ fn an_operators_day() {
     let (_, table) = page.split_once("<table id=\"orders\">").unwrap();
     let table = &table[..table.find("</table>").unwrap()];
     assert_eq!(table.matches("<td>100.0 %</td>").count(), 3, "{table}");
+
+    a_night_over_the_radio(&day, &folder.path().join("night"), &mut done);
 
     let words = |words: &str| words.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>();
     let (shown, flown): (Vec<_>, Vec<_>) =

@@ -49,7 +49,7 @@ impl Wheels {
 
     /// What the wheels make of a torque command [N m] at their speeds [rad/s]: clamped to their limit, and nothing that
     /// would speed up a wheel beyond its speed limit.
-    #[expect(clippy::manual_clamp, reason = "`clamp` checks its limits, on three axes twice a tick: 5 % of a tick")]
+    #[allow(clippy::manual_clamp, reason = "`clamp` checks its limits, on three axes twice a tick: 5 % of a tick")]
     #[inline]
     #[must_use]
     pub fn saturate(&self, command: &Vector3<f64>, speed: &Vector3<f64>) -> Vector3<f64> {

@@ -28,6 +28,7 @@ pub fn all(node: &Node) -> Result<Vec<Service>> {
         offer(node, &graph::LIST_STRIPS)?,
         offer(node, &graph::LIST_HISTORY)?,
         offer(node, &graph::PREVIEW_STRIP)?,
+        offer(node, &graph::LIST_WAYS)?,
         offer(node, &graph::GET_LIMITS)?,
         offer(node, &graph::SET_PLANNER_MODE)?,
         offer(node, &graph::REVIEW_PROPOSAL)?,

@@ -133,6 +133,7 @@ impl Recorded {
     }
 
     /// Whether the bag has a topic.
+    #[must_use]
     pub fn has<M>(&self, topic: &graph::Topic<M>) -> bool {
         let name = self.name_of(topic);
         self.bag.topics().iter().any(|recorded| recorded.topic.name == name)

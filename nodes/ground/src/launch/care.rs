@@ -120,7 +120,7 @@ impl Launcher {
     /// and without another one the mission ends.
     fn give_up(&mut self, fleet: &mut Fleet, node: &str, tick: Tick, reason: String) -> Result<()> {
         tracing::error!("{reason}");
-        if !graph::FLIGHT_NODES.contains(&node) {
+        if !graph::ALL_FLIGHT_NODES.contains(&node) {
             return Ok(());
         }
         self.tell(tick, SAFE_MODE, true, &reason);

@@ -142,9 +142,6 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         if mission.sim.resources.is_some() {
             bail!("a mission with [resources] flies in one process only: add --in-process");
         }
-        if mission.link.is_some() {
-            bail!("a mission with [link] flies in one process only: add --in-process");
-        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
@@ -202,7 +199,7 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
-        let wishes = Wishes { record: !args.no_bag, console: args.console };
+        let wishes = Wishes { record: !args.no_bag, console: args.console, radio: mission.link.is_some() };
         over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
     }
 }

@@ -1,4 +1,4 @@
-//! A mission over DDS: four nodes and the recorder, each a process of its own.
+//! A mission over DDS: the nodes that fly and the recorder, each a process of its own.
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -31,10 +31,13 @@ use swath_mission::faults::grammar::{Failure, Process};
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::faults::{FaultPlan, What};
 use swath_mission::file::Mission;
+use swath_mission::link::ground::Ground;
+use swath_mission::link::response::LinkSummary;
 use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs, TaskLine};
 use swath_mission::requests::journal::{Attempt, Outcome as AttemptOutcome};
 use swath_mission::task_log::TaskLog;
 
+use crate::requests::ground_end::GroundEnd;
 use crate::requests::orders::{Orders, stored};
 use crate::requests::store::Store;
 
@@ -63,6 +66,8 @@ pub struct Wishes {
     pub record: bool,
     /// Where the console listens, if there is one.
     pub console: Option<SocketAddr>,
+    /// Whether there is a radio between ground and satellite.
+    pub radio: bool,
 }
 
 /// Flies a mission over DDS; an error where nothing was flown.
@@ -129,7 +134,7 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
         true => count_messages(&output.path().join("bag")),
         false => Ok(0),
     });
-    let ended = fleet.stop(&graph::FLIGHT_NODES);
+    let ended = fleet.stop(&graph::ALL_FLIGHT_NODES);
     drop(fleet);
     let (messages_recorded, unrecorded) = match recorded {
         Ok(count) => (count, None),
@@ -139,6 +144,8 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
     let failure = watched.err().or(unrecorded).or(ended.err());
     let safe_mode = launcher.safe_mode.take();
     let model = mission.model()?;
+    let ground = ground(mission, &model, output)?;
+    output.write_ways(&ground.iter().flat_map(Ground::lines).collect::<Vec<_>>())?;
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
         decided_instead: made_instead(launcher.deciders.clone(), &mission.planner),
@@ -153,9 +160,16 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
         nodes,
         orders: orders(output),
         resources: None,
-        link: None,
+        link: ground.map(|ground| LinkSummary::new(ground.lines(), model.period)),
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
+}
+
+/// The ground as the request manager left it, in a mission with a radio.
+fn ground(mission: &Mission, model: &Model, output: &OutputFolder) -> Result<Option<Ground>> {
+    let Some(mut end) = GroundEnd::new(mission, model)? else { return Ok(None) };
+    end.take_up(&Store::open_read_only(&output.path().join(STORE))?)?;
+    Ok(Some(end.into_ground()))
 }
 
 /// What became of orders, from the store that the request manager left.
@@ -207,13 +221,8 @@ fn full_bag(launcher: &Launcher) -> Vec<String> {
 
 /// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
 fn show(fleet: &mut Fleet, title: &str, namespace: &str, address: SocketAddr) -> Result<()> {
-    let words = [
-        "console".to_owned(),
-        format!("--listen={address}"),
-        format!("--title={title}"),
-        format!("--namespace={namespace}"),
-    ];
-    fleet.start_beside(graph::CONSOLE, "swath", &words)?;
+    let words = [format!("--listen={address}"), format!("--title={title}"), format!("--namespace={namespace}")];
+    fleet.start_beside(graph::CONSOLE, "swath-console", &words)?;
     out::say(format_args!("console: {}", fleet.wait_for_line(graph::CONSOLE, START_TIMEOUT)?));
     Ok(())
 }
@@ -233,10 +242,15 @@ fn start_nodes(
     };
     let store = format!("store:={}", text(&output.path().join(STORE))?);
     fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
-    for (name, program) in [(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")] {
+    let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
+    let mut others = vec![(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")];
+    if wishes.radio {
+        peers.extend(graph::RADIO_NODES);
+        others.extend([(graph::CATALOGUE, "swath-catalogue"), (graph::LINK, "swath-link")]);
+    }
+    for (name, program) in others {
         fleet.start(name, program, &words(&[]))?;
     }
-    let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
     if wishes.record {
         peers.push(graph::RECORDER);
     }

@@ -6,6 +6,7 @@ mod cover;
 mod export;
 mod fault;
 mod files;
+mod link;
 mod orders;
 mod planner;
 mod query;
@@ -16,6 +17,7 @@ mod watch;
 
 pub use alarms::{AlarmsArgs, run as run_alarms};
 pub use fault::{FaultArgs, run as run_fault};
+pub use link::{LinkArgs, run as run_link};
 pub use planner::{PlannerArgs, run as run_planner};
 
 use anyhow::Result;

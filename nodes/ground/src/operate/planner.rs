@@ -11,6 +11,7 @@ use swath_ros::{RosArgs, graph};
 
 use super::client::Operator;
 use super::files::printable;
+use super::link;
 use crate::place::Place;
 use crate::requests::json::{time, time_json};
 
@@ -93,6 +94,9 @@ pub fn run(args: &PlannerArgs, ros: &RosArgs) -> Result<()> {
             let statuses = operator.node.subscription(&graph::PLANNER_STATUS)?;
             let status = statuses.newest(operator.node.signal(), TIMEOUT)?;
             let status = status.context("no planner is flying in this domain")?;
+            if link::status(&operator)?.is_some() {
+                bail!("the planner is on board: with [link] nobody on the ground sees it");
+            }
             let text = if args.json { format!("{}\n", status_json(&status)) } else { status_text(&status) };
             out::print(&text)?;
         }

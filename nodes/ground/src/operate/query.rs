@@ -11,6 +11,7 @@ use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
 use super::files::{CuttingArgs, Files};
+use super::link::{Outlook, status as link_status, way_json, way_text, way_word, ways};
 use super::selection::Common;
 use super::show::{opportunity_json, opportunity_table, report_json, report_text, status_head, status_line};
 use crate::requests::json::status_json;
@@ -98,6 +99,7 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
         calls.push((format!("strip {id}"), call));
     }
     let desk = operator.desk(&graph::PREVIEW_STRIP)?;
+    let link = link_status(&operator)?;
     let mut refused = 0;
     let count = calls.len();
     for (name, call) in calls {
@@ -105,10 +107,13 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
         refused += usize::from(answer.reason_code != 0);
         let text = if args.json {
             let opportunities: Vec<_> = answer.opportunities.iter().map(opportunity_json).collect();
-            let line = json!({
+            let mut line = json!({
                 "name": name, "opportunities": opportunities,
                 "reason_code": answer.reason_code, "reason": answer.reason,
             });
+            if let Some(link) = &link {
+                line["over_the_radio"] = Outlook::new(link, &answer.opportunities).json();
+            }
             format!("{line}\n")
         } else if answer.reason_code != 0 {
             format!("{name}: {} (reason {})\n", answer.reason, answer.reason_code)
@@ -117,7 +122,8 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
                 args.hours.map_or("until the mission's end".to_owned(), |hours| format!("in the next {hours} h"));
             format!("{name}: no chance {span}\n")
         } else {
-            format!("{name}\n{}", opportunity_table(&answer.opportunities))
+            let radio = link.as_ref().map(|link| Outlook::new(link, &answer.opportunities).text());
+            format!("{name}\n{}{}", opportunity_table(&answer.opportunities), radio.unwrap_or_default())
         };
         if !out::print(&text)? {
             break;
@@ -145,6 +151,7 @@ pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
     };
     let mut left = if args.limit == 0 { usize::MAX } else { args.limit as usize };
     let mut orders = Orders::default();
+    let ways = ways(&operator, args.after, usize::MAX)?;
     let mut listening = args.json || out::print_line(status_head())?;
     loop {
         let page = desk.call(call.clone())?;
@@ -152,7 +159,7 @@ pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
         let meant: Vec<_> = page.strips.iter().filter(|status| args.common.holds(status)).collect();
         let more = page.more || meant.len() > left;
         for status in meant.into_iter().take(left) {
-            let line = || if args.json { status_json(status).to_string() } else { status_line(status) };
+            let line = || line_of(status, ways.get(&status.strip.id), args.json);
             listening = listening && out::print_line(line())?;
             orders.add(status);
             left -= 1;
@@ -174,6 +181,20 @@ pub fn list(args: &ListArgs, ros: &RosArgs) -> Result<()> {
     Ok(())
 }
 
+/// A strip as a line, with its way over the radio if there is one.
+fn line_of(status: &msg::StripStatus, way: Option<&msg::StripWay>, as_json: bool) -> String {
+    match (as_json, way) {
+        (true, None) => status_json(status).to_string(),
+        (true, Some(way)) => {
+            let mut line = status_json(status);
+            line["way"] = way_json(way);
+            line.to_string()
+        }
+        (false, None) => status_line(status),
+        (false, Some(way)) => format!("{}  [{}]", status_line(status), way_word(way)),
+    }
+}
+
 /// Shows all that is known of a strip.
 ///
 /// # Errors
@@ -188,10 +209,16 @@ pub fn show(args: &ShowArgs, ros: &RosArgs) -> Result<()> {
     let answer = operator.desk(&graph::GET_STRIP)?.call(call)?;
     check(answer.reason_code, &answer.reason)?;
     let report = answer.report.first().context("the answer holds no report")?;
+    let id = report.status.strip.id;
+    let way = ways(&operator, id.saturating_sub(1), 1)?.remove(&id);
     if args.json {
-        out::print_line(serde_json::to_string_pretty(&report_json(report))?)?;
+        let mut all = report_json(report);
+        if let Some(way) = &way {
+            all["way"] = way_json(way);
+        }
+        out::print_line(serde_json::to_string_pretty(&all)?)?;
     } else {
-        out::print(&report_text(report))?;
+        out::print(&(report_text(report) + &way.as_ref().map(way_text).unwrap_or_default()))?;
     }
     Ok(())
 }

@@ -39,6 +39,7 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
     let events = operator.node.subscription(&graph::STRIP_EVENTS)?;
     let summaries = operator.node.subscription(&graph::REQUEST_SUMMARY)?;
     let planner = operator.node.subscription(&graph::PLANNER_STATUS)?;
+    let radio = operator.node.subscription(&graph::LINK_STATUS)?;
     let live = std::io::stdout().is_terminal() && !args.json;
     let mut view = View::default();
     let mut seen = 0;
@@ -62,7 +63,16 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
             news = true;
         }
         while let Some(status) = planner.take()? {
-            view.planner = Some(status);
+            // With a radio it is on board, and nobody on the ground sees it.
+            view.planner = view.radio.is_none().then_some(status);
+            news = true;
+        }
+        while let Some(status) = radio.take()? {
+            let turned = view.radio.as_ref().is_none_or(|before| before.open != status.open);
+            if !live && !args.json && turned && !out::print_line(radio_line(&status))? {
+                return Ok(());
+            }
+            (view.radio, view.planner) = (Some(status), None);
             news = true;
         }
         if live && news {
@@ -80,8 +90,23 @@ fn event_line(event: &msg::StripStatus) -> String {
     format!("{}  {}", time(&event.header.stamp), status_line(event))
 }
 
+/// That the link has opened or closed, and what waits for it.
+fn radio_line(status: &msg::LinkStatus) -> String {
+    format!(
+        "{}  link {}: {} orders and {} changes wait, {} on board, {} imaged, {} delivered",
+        time(&status.header.stamp),
+        if status.open { "up" } else { "down" },
+        status.waiting_orders,
+        status.waiting_changes,
+        status.on_board,
+        status.imaged,
+        status.delivered,
+    )
+}
+
 #[derive(Default)]
 struct View {
+    radio: Option<msg::LinkStatus>,
     summary: Option<msg::RequestSummary>,
     planner: Option<msg::PlannerStatus>,
     last: VecDeque<msg::StripStatus>,
@@ -103,6 +128,9 @@ impl View {
                 it.rejected,
                 it.reward,
             );
+        }
+        if let Some(it) = &self.radio {
+            text += &format!("{}\n", radio_line(it));
         }
         if let Some(it) = &self.planner {
             text += &super::planner::status_text(it);

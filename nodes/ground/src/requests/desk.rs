@@ -11,9 +11,11 @@ use swath_ros::{Node, RequestId, RosError, Server, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
+use super::book::Book;
 use super::messages;
 use super::outgoing::Outgoing;
 use super::store::Store;
+use super::ways;
 use swath_mission::requests::logic::RequestLogic;
 use swath_mission::requests::query::page_length;
 use swath_mission::requests::refusal::{BATCH_MAX, Refusal, check_batch};
@@ -29,6 +31,7 @@ pub(super) struct Desk {
     list: Server<msg::ListStrips>,
     history: Server<msg::ListHistory>,
     preview: Server<msg::PreviewStrip>,
+    ways: Server<msg::ListWays>,
     limits: Server<msg::GetLimits>,
     /// Submissions that are being taken, a slice at a time.
     jobs: VecDeque<Job>,
@@ -54,6 +57,7 @@ impl Desk {
             list: node.server(&graph::LIST_STRIPS)?,
             history: node.server(&graph::LIST_HISTORY)?,
             preview: node.server(&graph::PREVIEW_STRIP)?,
+            ways: node.server(&graph::LIST_WAYS)?,
             limits: node.server(&graph::GET_LIMITS)?,
             jobs: VecDeque::new(),
             open: false,
@@ -66,24 +70,19 @@ impl Desk {
     }
 
     /// Takes the calls that have come. Those that ask without changing anything are answered at once.
-    pub(super) fn take(
-        &mut self,
-        logic: &mut RequestLogic,
-        base: &MissionNode,
-        outgoing: &mut Vec<Outgoing>,
-    ) -> Result<()> {
-        self.take_changes(logic, outgoing)?;
+    pub(super) fn take(&mut self, book: &mut Book, base: &MissionNode, outgoing: &mut Vec<Outgoing>) -> Result<()> {
+        self.take_changes(book, outgoing)?;
         while let Some((id, call)) = next(&self.get)? {
             outgoing.push(Outgoing::Get(id, call));
         }
         while let Some((id, call)) = next(&self.history)? {
             outgoing.push(Outgoing::History(id, call));
         }
-        self.answer_questions(logic, base)
+        self.answer_questions(book, base)
     }
 
     /// As [`Self::take`], while there is no room for what would be promised: changes are refused.
-    pub(super) fn refuse(&mut self, logic: &RequestLogic, base: &MissionNode, store: &Store) -> Result<()> {
+    pub(super) fn refuse(&mut self, book: &Book, base: &MissionNode, store: &Store) -> Result<()> {
         let (reason_code, reason) = (Refusal::StoreFull.code(), Refusal::StoreFull.to_string());
         while let Some((id, _)) = next(&self.submit)? {
             let answer = msg::SubmitStripsResponse { reason_code, reason: reason.clone(), ..Default::default() };
@@ -94,7 +93,7 @@ impl Desk {
             self.cancel.respond(id, answer)?;
         }
         while let Some((id, _)) = next(&self.replace)? {
-            let result = messages::submit_result(logic, true, Err(Refusal::StoreFull));
+            let result = messages::submit_result(book.logic(), true, Err(Refusal::StoreFull));
             self.replace.respond(id, msg::ReplaceStripResponse { result })?;
         }
         while let Some((id, _)) = next(&self.review)? {
@@ -102,15 +101,15 @@ impl Desk {
             self.review.respond(id, answer)?;
         }
         while let Some((id, call)) = next(&self.get)? {
-            self.answer(Outgoing::Get(id, call), logic, base, store)?;
+            self.answer(Outgoing::Get(id, call), book.logic(), base, store)?;
         }
         while let Some((id, call)) = next(&self.history)? {
-            self.answer(Outgoing::History(id, call), logic, base, store)?;
+            self.answer(Outgoing::History(id, call), book.logic(), base, store)?;
         }
-        self.answer_questions(logic, base)
+        self.answer_questions(book, base)
     }
 
-    fn take_changes(&mut self, logic: &mut RequestLogic, outgoing: &mut Vec<Outgoing>) -> Result<()> {
+    fn take_changes(&mut self, book: &mut Book, outgoing: &mut Vec<Outgoing>) -> Result<()> {
         while let Some((id, call)) = next(&self.submit)? {
             match self.admit(call.requests.len()) {
                 Ok(()) => {
@@ -130,25 +129,23 @@ impl Desk {
         }
         while let Some((id, call)) = next(&self.cancel)? {
             let cancel = |&number: &u64| {
-                let result = logic.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
-                messages::submit_result(logic, true, result)
+                let result = book.cancel(StripId(number), &call.actor, &call.reason).map(|()| StripId(number));
+                messages::submit_result(book.logic(), true, result)
             };
             let (results, reason_code, reason) = self.each(&call.ids, cancel);
             outgoing.push(Outgoing::Cancelled(id, msg::CancelStripsResponse { results, reason_code, reason }));
         }
         while let Some((id, call)) = next(&self.replace)? {
-            let before = logic.len();
-            let now = logic.now();
-            let result = self.admit(1).and_then(|()| logic.replace(StripId(call.id), order_of(&call.request), now));
-            let result = messages::submit_result(logic, logic.len() == before, result);
+            let before = book.logic().len();
+            let result = self.admit(1).and_then(|()| book.replace(StripId(call.id), order_of(&call.request)));
+            let result = messages::submit_result(book.logic(), book.logic().len() == before, result);
             outgoing.push(Outgoing::Replaced(id, msg::ReplaceStripResponse { result }));
         }
         while let Some((id, call)) = next(&self.review)? {
             let decide = |&number: &u64| {
                 let review = messages::review(call.action);
-                let decided =
-                    review.and_then(|review| logic.review(StripId(number), review, &call.actor, &call.reason));
-                messages::submit_result(logic, true, decided.map(|()| StripId(number)))
+                let decided = review.and_then(|review| book.review(StripId(number), review, &call.actor, &call.reason));
+                messages::submit_result(book.logic(), true, decided.map(|()| StripId(number)))
             };
             let (results, reason_code, reason) = self.each(&call.ids, decide);
             outgoing.push(Outgoing::Reviewed(id, msg::ReviewStripsResponse { results, reason_code, reason }));
@@ -157,12 +154,15 @@ impl Desk {
     }
 
     /// Answers those who only ask.
-    fn answer_questions(&mut self, logic: &RequestLogic, base: &MissionNode) -> Result<()> {
+    fn answer_questions(&mut self, book: &Book, base: &MissionNode) -> Result<()> {
         while let Some((id, call)) = next(&self.list)? {
-            self.list.respond(id, list(logic, base, &call))?;
+            self.list.respond(id, list(book.logic(), base, &call))?;
         }
         while let Some((id, call)) = next(&self.preview)? {
-            self.preview.respond(id, preview(logic, base, &call))?;
+            self.preview.respond(id, preview(book.logic(), base, &call))?;
+        }
+        while let Some((id, call)) = next(&self.ways)? {
+            self.ways.respond(id, ways::list(book, &base.stamper, &call))?;
         }
         while let Some((id, _)) = next(&self.limits)? {
             self.limits.respond(id, messages::limits(&base.mission.cutting()))?;
@@ -171,17 +171,17 @@ impl Desk {
     }
 
     /// Takes up to `slice` requests of the submissions that have come.
-    pub(super) fn work(&mut self, logic: &mut RequestLogic, slice: usize, outgoing: &mut Vec<Outgoing>) {
+    pub(super) fn work(&mut self, book: &mut Book, slice: usize, outgoing: &mut Vec<Outgoing>) {
         let mut left = slice;
         while left > 0
             && let Some(job) = self.jobs.front_mut()
         {
             let taken = job.requests.by_ref().take(left);
-            let (before, now) = (job.results.len(), logic.now());
+            let before = job.results.len();
             job.results.extend(taken.map(|request| {
-                let before = logic.len();
-                let result = logic.submit(order_of(&request), now);
-                messages::submit_result(logic, logic.len() == before, result)
+                let before = book.logic().len();
+                let result = book.submit(order_of(&request));
+                messages::submit_result(book.logic(), book.logic().len() == before, result)
             }));
             left -= job.results.len() - before;
             if job.requests.len() == 0
@@ -224,7 +224,7 @@ impl Desk {
             Outgoing::Reviewed(id, response) => self.review.respond(id, response)?,
             Outgoing::Get(id, call) => self.get.respond(id, get(logic, base, store, &call)?)?,
             Outgoing::History(id, call) => self.history.respond(id, history(base, store, &call)?)?,
-            Outgoing::Offer(_) | Outgoing::Result(_) | Outgoing::News(_) | Outgoing::Summary => {}
+            Outgoing::Offer(_) | Outgoing::Result(_) | Outgoing::Radio(_) | Outgoing::News(_) | Outgoing::Summary => {}
         }
         Ok(())
     }

@@ -2,11 +2,10 @@
 
 use swath_mission::orders::action::Review;
 use swath_mission::orders::cutting::Cutting;
-use swath_mission::orders::order::Order;
 use swath_mission::requests::index::Area;
 use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome};
 use swath_mission::requests::lifecycle::State;
-use swath_mission::requests::logic::{Abort, Offer, RequestLogic};
+use swath_mission::requests::logic::{Abort, RequestLogic};
 use swath_mission::requests::query::{Filter, Opportunity};
 use swath_mission::requests::reason::Reason;
 use swath_mission::requests::refusal::Refusal;
@@ -15,7 +14,6 @@ use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::swath_msgs as msg;
 use swath_node::orders::strip;
 use swath_node::stamp::{EARTH_FRAME, Stamper};
-use swath_sim::requests::catalogue::Candidate;
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 use swath_sim::world::windows::Window;
@@ -86,32 +84,6 @@ fn area(call: &msg::ListStripsRequest) -> Result<Area, Refusal> {
     }
     let (south_deg, north_deg) = (call.south_deg, call.north_deg);
     Ok(Area { south_deg, north_deg, west_deg: call.west_deg, east_deg: call.east_deg })
-}
-
-/// What the planner is offered; `request` gives what was asked for under an identity.
-#[must_use]
-pub fn upcoming_strips<'a>(
-    stamper: &Stamper,
-    offer: &Offer,
-    request: impl Fn(&Candidate) -> Option<&'a Order>,
-) -> msg::UpcomingStrips {
-    let candidates = offer.candidates.iter().filter_map(|candidate| {
-        Some(msg::Candidate {
-            strip: strip(candidate.id.0, request(candidate)?),
-            window_open_tick: candidate.window.open.0,
-            window_close_tick: candidate.window.close.0,
-            t_acq_ticks: candidate.t_acq,
-            twin: number(candidate.twin),
-        })
-    });
-    msg::UpcomingStrips {
-        header: stamper.header(offer.tick, EARTH_FRAME),
-        tick: offer.tick.0,
-        task: offer.task,
-        candidates: candidates.collect::<Vec<_>>(),
-        pending: offer.pending as u64,
-        fulfilled: offer.fulfilled as u64,
-    }
 }
 
 /// Where a request stands now.

@@ -14,6 +14,8 @@ pub(super) enum Outgoing {
     Offer(Box<msg::UpcomingStrips>),
     /// How a task went, with its reward.
     Result(Box<msg::TaskResult>),
+    /// What leaves by the radio.
+    Radio(Box<msg::RadioSent>),
     /// Changes.
     News(Arc<Vec<Entry>>),
     /// How many requests stand where, when the mission is over.
@@ -31,7 +33,7 @@ pub(super) enum Outgoing {
 impl Outgoing {
     /// Whether the satellite waits for it, and nobody else takes it for a promise.
     pub(super) fn is_of_flight(&self) -> bool {
-        matches!(self, Self::Offer(_) | Self::Result(_) | Self::Summary)
+        matches!(self, Self::Offer(_) | Self::Result(_) | Self::Radio(_) | Self::Summary)
     }
 
     /// Answers promise more than the mission's own bookkeeping.

@@ -77,8 +77,12 @@ impl StoreError {
 }
 
 /// Steps from each schema to the next; the first makes an empty file schema 1.
-const MIGRATIONS: [&str; 3] =
-    [include_str!("schema_1.sql"), include_str!("schema_2.sql"), include_str!("schema_3.sql")];
+const MIGRATIONS: [&str; 4] = [
+    include_str!("schema_1.sql"),
+    include_str!("schema_2.sql"),
+    include_str!("schema_3.sql"),
+    include_str!("schema_4.sql"),
+];
 /// How long a connection waits for another one's lock.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Pages that are copied in one step.
@@ -282,6 +286,9 @@ impl Store {
                 Entry::Attempted(attempt) => insert_attempt(&transaction, attempt)?,
                 // The changes that follow from it tell of it here.
                 Entry::Taken(_) => {}
+                Entry::Told(input) => {
+                    transaction.prepare_cached("INSERT INTO told (input) VALUES (?1)")?.execute([input])?;
+                }
             }
         }
         write_progress(&transaction, progress)?;
@@ -317,6 +324,17 @@ impl Store {
             progress: progress.unwrap_or_default(),
             last_settled: self.last_settled().map_err(sql)?,
         })
+    }
+
+    /// What the ground's end of the radio was told, in order.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn told(&self) -> Result<Vec<Vec<u8>>, StoreError> {
+        let sql = |source| self.error(source);
+        let mut statement = self.connection.prepare("SELECT input FROM told ORDER BY sequence").map_err(sql)?;
+        let inputs = statement.query_map([], |row| row.get(0)).map_err(sql)?;
+        inputs.collect::<Result<_, _>>().map_err(sql)
     }
 
     /// What turns the ticks of its mission into times.

@@ -148,7 +148,7 @@ fn stores_of_other_missions_and_of_the_future_are_refused() {
     Connection::open(&path).unwrap().execute_batch("PRAGMA user_version=77").unwrap();
     for error in [Store::open(&path, "one").err(), Store::open_read_only(&path).err()] {
         let error = error.unwrap().to_string();
-        assert!(error.contains("has schema 77, this program knows schemas up to 3"), "{error}");
+        assert!(error.contains("has schema 77, this program knows schemas up to 4"), "{error}");
     }
     std::fs::write(&path, "this is no database, although it is long enough to look like one").unwrap();
     assert!(Store::open(&path, "one").is_err());

@@ -5,27 +5,30 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs as msg;
-use swath_node::messages::decision_point::situation;
-use swath_node::messages::task_result::task_record;
 use swath_ros::{Publisher, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::StripId;
 
+use super::book::Book;
 use super::desk::Desk;
+use super::flight::FlightSide;
+use super::ground_end::GroundEnd;
 use super::lock::StoreLock;
 use super::messages;
 use super::outgoing::Outgoing;
+use super::radio::{self, RadioSide};
 use super::store::{Durability, Store};
 use super::writer::Writer;
 use swath_mission::alarms::conditions::{Report, STORE_FULL};
 use swath_mission::faults::What;
 use swath_mission::faults::plan::Scheduled;
+use swath_mission::orders::action::Act;
+use swath_mission::orders::order::Order;
 use swath_mission::requests::journal::{Entry, Progress};
-use swath_mission::requests::lifecycle::State;
-use swath_mission::requests::logic::{Abort, RequestLogic};
+use swath_mission::requests::logic::RequestLogic;
 use swath_mission::requests::refusal::Refusal;
 use swath_node::lifecycle::{self, LifecycleNode};
 use swath_node::node::{MissionNode, Severity};
@@ -34,8 +37,6 @@ use swath_node::program::{Parameter, Program};
 
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
-/// How long the last messages before a fault by order may take to arrive.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// Requests of long calls that are taken before the mission is looked at again.
 const SLICE: usize = 100;
 
@@ -63,21 +64,13 @@ pub fn run() -> Result<()> {
 }
 
 struct RequestNode {
-    logic: RequestLogic,
+    book: Book,
+    side: Side,
     desk: Desk,
-    points: Subscription<msg::DecisionPoint>,
-    tasks: Subscription<msg::ImagingTask>,
-    phases: Subscription<msg::TaskPhase>,
     requests: Subscription<msg::StripRequest>,
-    upcoming: Publisher<msg::UpcomingStrips>,
     events: Publisher<msg::StripStatus>,
-    results: Publisher<msg::TaskResult>,
-    /// Tasks below this number have been told of.
-    told: u64,
     actions: Publisher<msg::OperatorAction>,
     summary: Publisher<msg::RequestSummary>,
-    aborts: Publisher<msg::TaskAbort>,
-    last: Option<msg::UpcomingStrips>,
     /// What goes out when the batch of its number is written.
     outbox: VecDeque<(u64, Outgoing)>,
     /// Changes that nobody could have heard of yet.
@@ -100,6 +93,28 @@ struct RequestNode {
     _temporary: Option<tempfile::TempDir>,
 }
 
+/// Who is on the other side: guidance and planner themselves, or a radio.
+enum Side {
+    Flight(Box<FlightSide>),
+    Radio(Box<RadioSide>),
+}
+
+impl Side {
+    fn new(base: &MissionNode) -> Result<Self> {
+        match base.mission.link {
+            None => Ok(Self::Flight(Box::new(FlightSide::new(base)?))),
+            Some(_) => Ok(Self::Radio(Box::new(RadioSide::new(base)?))),
+        }
+    }
+
+    fn begun(&self) -> bool {
+        match self {
+            Self::Flight(side) => side.begun(),
+            Self::Radio(side) => side.begun(),
+        }
+    }
+}
+
 impl RequestNode {
     fn new(base: MissionNode, path: PathBuf) -> Result<Self> {
         let (path, temporary) = if path.as_os_str().is_empty() {
@@ -112,24 +127,17 @@ impl RequestNode {
         let lock = StoreLock::take(&path, base.goes_on())?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
-        let logic = take_up(&base, &mut store)?;
+        let book = take_up(&base, &mut store)?;
         let mut node = Self {
             desk: Desk::new(&base.node)?,
-            points: base.node.subscription(&graph::DECISION_POINT)?,
-            tasks: base.node.subscription(&graph::PLANNER_TASK)?,
-            phases: base.node.subscription(&graph::TASK_PHASE)?,
+            side: Side::new(&base)?,
             requests: base.node.subscription(&graph::STRIP_REQUEST)?,
-            upcoming: base.node.publisher(&graph::UPCOMING_STRIPS)?,
             events: base.node.publisher(&graph::STRIP_EVENTS)?,
-            results: base.node.publisher(&graph::TASK_RESULTS)?,
-            told: 0,
             actions: base.node.publisher(&graph::REQUEST_ACTIONS)?,
             summary: base.node.publisher(&graph::REQUEST_SUMMARY)?,
-            aborts: base.node.publisher(&graph::TASK_ABORT)?,
-            last: None,
             outbox: VecDeque::new(),
             unheard: Vec::new(),
-            written: logic.progress(),
+            written: book.logic().progress(),
             writer: Writer::start(store, base.node.signal().clone()),
             full_told: false,
             full_ordered: false,
@@ -137,7 +145,7 @@ impl RequestNode {
             clock: None,
             clock_at: Tick(0),
             reader,
-            logic,
+            book,
             base,
             _lock: lock,
             _temporary: temporary,
@@ -159,130 +167,83 @@ impl RequestNode {
         Ok(())
     }
 
-    /// The questions of guidance, and what is answered.
-    fn take_points(&mut self) -> Result<Vec<Outgoing>> {
-        let mut outgoing = Vec::new();
+    /// What is on the other side of it: questions of guidance and what is answered, or the next tick of the radio.
+    fn take_side(&mut self, outgoing: &mut Vec<Outgoing>) -> Result<Option<(Tick, bool)>> {
         self.take_fault_orders()?;
-        while let Some(point) = self.points.take()? {
+        loop {
+            let point = match (&mut self.side, &mut self.book) {
+                (Side::Flight(side), Book::Whole(_)) => side.next()?,
+                // Without room the ground is deaf and mute: what it does not hear is sent again.
+                (Side::Radio(side), Book::Ground(end)) => return side.take(end, &self.base, self.writer.full()),
+                // Both follow from the mission.
+                _ => None,
+            };
+            let Some(point) = point else { break };
             self.take_fault_orders()?;
-            if self.base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
-                let _ = self.results.flush(FLUSH_TIMEOUT);
-                self.base.strike();
-            }
             self.mind_room(Tick(point.tick))?;
-            let offer = self.offer(&point)?;
-            outgoing.extend(self.results(&point).into_iter().map(|result| Outgoing::Result(Box::new(result))));
-            // One who rests offers nothing; guidance asks again.
-            outgoing.extend(offer.filter(|_| self.desk.open).map(|offer| Outgoing::Offer(Box::new(offer))));
-            if point.mission_over {
-                outgoing.push(Outgoing::Summary);
+            if let (Side::Flight(side), Book::Whole(logic)) = (&mut self.side, &mut self.book) {
+                let offers = self.desk.open;
+                side.answer(&point, offers, logic, &self.base, &self.reader, outgoing)?;
             }
         }
-        Ok(outgoing)
+        if let (Side::Flight(side), Book::Whole(logic)) = (&self.side, &mut self.book) {
+            side.take_tasks(logic, &self.base)?;
+        }
+        Ok(None)
     }
 
     fn work(&mut self) -> Result<()> {
-        let mut outgoing = self.take_points()?;
-        while let Some(task) = self.tasks.take()? {
-            if let Some(flown) = messages::in_flight(&task) {
-                self.logic.on_task(flown);
-            }
-        }
-        while let Some(phase) = self.phases.take()? {
-            match self.base.tick(phase.tick) {
-                Ok(tick) if phase.phase == msg::WheelTorque::PHASE_IMAGING => self.logic.on_imaging(phase.task, tick),
-                Ok(_) => {}
-                Err(error) => self.base.alarm(Severity::Error, "phase refused", &error.to_string())?,
-            }
-        }
+        let mut outgoing = Vec::new();
+        let sends = self.take_side(&mut outgoing)?;
         self.mind_room(Tick(0))?;
+        self.take_what_is_asked(&mut outgoing)?;
+        if let (Some((tick, open)), Book::Ground(end)) = (sends, &mut self.book) {
+            let sent = end.send(tick, open && !self.writer.full());
+            outgoing.push(Outgoing::Radio(Box::new(radio::message(&self.base, tick, sent))));
+            outgoing.extend((tick >= self.base.horizon).then_some(Outgoing::Summary));
+        }
+        self.hand_over(outgoing);
+        match (&mut self.side, &mut self.book) {
+            (Side::Flight(side), Book::Whole(logic)) => side.tell_aborts(logic, &self.base)?,
+            (Side::Radio(side), Book::Ground(end)) => side.tell_status(end, &self.base)?,
+            _ => {}
+        }
+        for contradiction in self.book.take_contradictions() {
+            self.base.alarm(Severity::Error, "contradiction", &contradiction.to_string())?;
+        }
+        self.release()?;
+        self.writer.check()?;
+        let busy = sends.is_some() || (self.desk.is_busy() && self.book.may_be_asked());
+        self.base.wait(if busy { Duration::ZERO } else { IDLE })?;
+        Ok(())
+    }
+
+    fn take_what_is_asked(&mut self, outgoing: &mut Vec<Outgoing>) -> Result<()> {
+        if !self.book.may_be_asked() {
+            return Ok(());
+        }
         while let Some(request) = self.requests.take()? {
-            let now = self.logic.now();
             let taken = match self.writer.full() {
                 true => Err(Refusal::StoreFull),
-                false => self.desk.admit(1).and_then(|()| self.logic.submit(order_of(&request), now)),
+                false => self.desk.admit(1).and_then(|()| self.book.submit(order_of(&request))),
             };
             if let Err(refusal) = taken {
                 self.base.alarm(Severity::Warn, "request refused", &refusal.to_string())?;
             }
         }
         if self.writer.full() {
-            self.desk.refuse(&self.logic, &self.base, &self.reader)?;
+            self.desk.refuse(&self.book, &self.base, &self.reader)?;
         } else {
-            self.desk.take(&mut self.logic, &self.base, &mut outgoing)?;
+            self.desk.take(&mut self.book, &self.base, outgoing)?;
         }
-        self.desk.work(&mut self.logic, SLICE, &mut outgoing);
-        self.hand_over(outgoing);
-        self.tell_aborts()?;
-        for contradiction in self.logic.take_contradictions() {
-            self.base.alarm(Severity::Error, "contradiction", &contradiction.to_string())?;
-        }
-        self.release()?;
-        self.writer.check()?;
-        let wait = if self.desk.is_busy() { Duration::ZERO } else { IDLE };
-        self.base.wait(wait)?;
+        self.desk.work(&mut self.book, SLICE, outgoing);
         Ok(())
-    }
-
-    fn offer(&mut self, point: &msg::DecisionPoint) -> Result<Option<msg::UpcomingStrips>> {
-        // The question again: the answer may have been lost.
-        if let Some(last) = self.last.as_ref().filter(|last| last.task == point.task && !point.mission_over) {
-            return Ok(Some(last.clone()));
-        }
-        let now = match self.base.tick(point.tick) {
-            Ok(now) => now,
-            Err(error) => {
-                self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?;
-                return Ok(None);
-            }
-        };
-        if now < self.logic.now() && self.last.is_none() {
-            if self.base.goes_on() {
-                // A reader that comes late is sent what the writer still holds.
-                tracing::debug!("a decision point of {now} is old");
-                return Ok(None);
-            }
-            let known = self.logic.now();
-            bail!("store {} is of a flight that is at {known}, this one is at {now}", self.reader.path().display());
-        }
-        self.base.set_now(now);
-        let results = point.result.iter().chain(&point.last_imaging).map(task_record);
-        let results = match results.collect::<Result<Vec<_>, _>>() {
-            Ok(results) => results,
-            Err(error) => {
-                self.base.alarm(Severity::Error, "task result refused", &error.to_string())?;
-                return Ok(None);
-            }
-        };
-        match situation(point) {
-            Ok(situation) => self.logic.set_situation(situation),
-            Err(error) => self.base.alarm(Severity::Error, "decision point refused", &error.to_string())?,
-        }
-        let offer = self.logic.on_decision_point(point.task, now, &results);
-        let logic = &self.logic;
-        let order = |id: StripId| logic.request(id).map(|request| &request.order);
-        let message = messages::upcoming_strips(&self.base.stamper, &offer, |candidate| order(candidate.id));
-        self.last = Some(message.clone());
-        Ok((!point.mission_over).then_some(message))
-    }
-
-    /// The tasks that nobody was told of yet, with their rewards.
-    fn results(&mut self, point: &msg::DecisionPoint) -> Vec<msg::TaskResult> {
-        let told = self.told;
-        let ended = point.last_imaging.iter().chain(&point.result);
-        let mut results: Vec<_> = ended.filter(|result| result.task >= told).cloned().collect();
-        results.dedup_by_key(|result| result.task);
-        for result in &mut results {
-            result.reward = self.logic.reward_of(result.task);
-            self.told = self.told.max(result.task + 1);
-        }
-        results
     }
 
     /// Gives the journal to the writer, and lets what goes out wait for it.
     fn hand_over(&mut self, outgoing: Vec<Outgoing>) {
-        let entries = Arc::new(self.logic.take_journal());
-        let progress = self.logic.progress();
+        let entries = Arc::new(self.book.take_journal());
+        let progress = self.book.logic().progress();
         if !entries.is_empty() || progress != self.written {
             let durability = outgoing.iter().map(Outgoing::durability).max().unwrap_or(Durability::Process);
             self.writer.write(Arc::clone(&entries), progress, durability);
@@ -312,21 +273,31 @@ impl RequestNode {
         for outgoing in ready {
             match outgoing {
                 Outgoing::Offer(offer) => {
-                    self.upcoming.publish(&offer)?;
-                    for entries in std::mem::take(&mut self.unheard) {
-                        self.tell_news(&entries)?;
+                    if let Side::Flight(side) = &self.side {
+                        side.send_offer(&offer)?;
                     }
+                    self.tell_unheard()?;
                     self.tell_summary()?;
                 }
-                Outgoing::Result(result) => self.results.publish(&result)?,
+                Outgoing::Radio(sent) => {
+                    if let Side::Radio(side) = &mut self.side {
+                        side.send(&sent)?;
+                    }
+                    self.tell_unheard()?;
+                }
+                Outgoing::Result(result) => {
+                    if let Side::Flight(side) = &self.side {
+                        side.send_result(&result)?;
+                    }
+                }
                 Outgoing::Summary => self.tell_summary()?,
                 // Before the mission begins nobody may be listening yet.
-                Outgoing::News(entries) if self.last.is_none() => self.unheard.push(entries),
+                Outgoing::News(entries) if !self.side.begun() => self.unheard.push(entries),
                 Outgoing::News(entries) => {
                     self.tell_news(&entries)?;
                     self.tell_summary()?;
                 }
-                answer => self.desk.answer(answer, &self.logic, &self.base, &self.reader)?,
+                answer => self.desk.answer(answer, self.book.logic(), &self.base, &self.reader)?,
             }
         }
         Ok(())
@@ -347,36 +318,29 @@ impl RequestNode {
         if full != self.full_told {
             self.full_told = full;
             let text = if full { Refusal::StoreFull.to_string() } else { "there is room".to_owned() };
-            let at = self.logic.now().max(self.clock_at);
+            let at = self.book.logic().now().max(self.clock_at);
             self.base.condition(&Report::new(at, graph::REQUEST_MANAGER, STORE_FULL, full, text))?;
         }
         Ok(())
     }
 
+    fn tell_unheard(&mut self) -> Result<()> {
+        std::mem::take(&mut self.unheard).iter().try_for_each(|entries| self.tell_news(entries))
+    }
+
     fn tell_summary(&self) -> Result<()> {
-        Ok(self.summary.publish(&messages::request_summary(&self.base.stamper, &self.logic))?)
+        Ok(self.summary.publish(&messages::request_summary(&self.base.stamper, self.book.logic()))?)
     }
 
     fn tell_news(&self, entries: &[Entry]) -> Result<()> {
         for entry in entries {
             match entry {
                 Entry::Changed(change) => {
-                    self.events.publish(&messages::change(&self.base.stamper, &self.logic, change))?;
+                    self.events.publish(&messages::change(&self.base.stamper, self.book.logic(), change))?;
                 }
                 Entry::Taken(action) => self.actions.publish(&operator_action(&self.base.stamper, action))?,
-                Entry::Added(_) | Entry::Attempted(_) => {}
+                Entry::Added(_) | Entry::Attempted(_) | Entry::Told(_) => {}
             }
-        }
-        Ok(())
-    }
-
-    fn tell_aborts(&mut self) -> Result<()> {
-        for abort in self.logic.take_aborts() {
-            let Abort { task, id } = abort;
-            let state = self.logic.state(id).map_or("unknown", State::name);
-            let reason = format!("request {} is {state}", id.0);
-            tracing::info!("task {task} should be given up: {reason}");
-            self.aborts.publish(&messages::task_abort(&self.base.stamper, self.logic.now(), abort, reason))?;
         }
         Ok(())
     }
@@ -416,7 +380,17 @@ impl LifecycleNode for RequestNode {
 }
 
 /// The requests as they stood, or those of the mission when it begins.
-fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
+fn take_up(base: &MissionNode, store: &mut Store) -> Result<Book> {
+    if let Some(mut end) = GroundEnd::new(&base.mission, &base.model)? {
+        match store.snapshot()?.begun {
+            true => end.take_up(store)?,
+            false => take_initial(base, |order| {
+                let actor = order.submitter.clone();
+                end.ask(&actor, "", Act::Submit(StripId(0), Box::new(order))).is_ok()
+            })?,
+        }
+        return Ok(Book::Ground(Box::new(end)));
+    }
     let snapshot = store.snapshot()?;
     let mut logic =
         RequestLogic::new((*base.model).clone(), &base.mission.initial(), base.horizon, base.mission.rules());
@@ -424,12 +398,18 @@ fn take_up(base: &MissionNode, store: &mut Store) -> Result<RequestLogic> {
         let (count, at) = (snapshot.requests.len(), snapshot.progress.now);
         logic.restore(snapshot.requests, snapshot.rejected, snapshot.progress, snapshot.last_settled)?;
         tracing::info!("{count} requests are taken up from {}, at {at}", store.path().display());
-        return Ok(logic);
+        return Ok(Book::Whole(Box::new(logic)));
     }
+    take_initial(base, |order| logic.submit(order, Tick(0)).is_ok())?;
+    Ok(Book::Whole(Box::new(logic)))
+}
+
+/// Takes the strips known from the start.
+fn take_initial(base: &MissionNode, mut take: impl FnMut(Order) -> bool) -> Result<()> {
     let (requests, faults) = base.mission.initial_requests()?;
     faults.iter().for_each(|fault| tracing::warn!("{fault}"));
     let total = requests.len();
-    let accepted = requests.into_iter().filter_map(|order| logic.submit(order, Tick(0)).ok()).count();
+    let accepted = requests.into_iter().map(&mut take).filter(|taken| *taken).count();
     tracing::info!("{accepted} of the {total} strips known from the start are accepted");
-    Ok(logic)
+    Ok(())
 }

@@ -1,24 +1,21 @@
 //! Ground, radio and satellite of a mission in one process.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use swath_sim::mission::RequestKeeper;
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::TaskRecord;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::flight::Situation;
-use swath_sim::vehicle::initial::InitialState;
 
 use super::catalogue::Catalogue;
+use super::channel::Channel;
 use super::ground::Ground;
 use super::radio::{Direction, Radio};
 use crate::absences::{Absences, Presence};
 use crate::orders::action::Action;
 use crate::requests::journal::InFlight;
 use crate::requests::refusal::Refusal;
-
-/// Frames on their way, by the tick at which they arrive.
-type UnderWay = BTreeMap<Tick, Vec<Vec<u8>>>;
 
 /// Ground and satellite apart, and the radio between them.
 ///
@@ -27,9 +24,7 @@ type UnderWay = BTreeMap<Tick, Vec<Vec<u8>>>;
 pub struct Apart {
     ground: Ground,
     space: Catalogue,
-    radio: Radio,
-    up: UnderWay,
-    down: UnderWay,
+    channel: Channel,
     /// The last tick at which frames have arrived, and the last at which both have sent.
     begun: Option<Tick>,
     finished: Option<Tick>,
@@ -38,26 +33,21 @@ pub struct Apart {
     refused: Vec<(Action, Refusal)>,
     /// When the ground is lost.
     absences: Absences,
-    /// What another ground is made of.
-    origin: (InitialState, Tick),
 }
 
 impl Apart {
     /// Both ends at the epoch.
     #[must_use]
-    pub fn new(ground: Ground, space: Catalogue, radio: Radio, origin: (InitialState, Tick)) -> Self {
+    pub fn new(ground: Ground, space: Catalogue, radio: Radio) -> Self {
         Self {
             ground,
             space,
-            radio,
-            up: UnderWay::new(),
-            down: UnderWay::new(),
+            channel: Channel::new(radio),
             begun: None,
             finished: None,
             to_come: VecDeque::new(),
             refused: Vec::new(),
             absences: Absences::default(),
-            origin,
         }
     }
 
@@ -82,7 +72,7 @@ impl Apart {
     /// The radio.
     #[must_use]
     pub fn radio(&self) -> &Radio {
-        &self.radio
+        self.channel.radio()
     }
 
     /// What was asked for and refused at once, and why.
@@ -95,8 +85,7 @@ impl Apart {
     fn next_event(&self) -> Option<Tick> {
         let next = self.finished.map_or(Tick(0), |last| last.after(1));
         let asked = self.to_come.front().map(|action| action.at.max(next));
-        let arrivals = [&self.up, &self.down].into_iter().filter_map(|it| it.keys().next().copied());
-        arrivals.chain(asked).chain(self.radio.next_open(next)).min()
+        asked.into_iter().chain(self.channel.next_event(next)).min()
     }
 
     /// A tick begins: frames arrive, and the ground is asked.
@@ -105,10 +94,10 @@ impl Apart {
             return;
         }
         self.begun = Some(tick);
-        for bytes in arrived(&mut self.up, tick) {
+        for bytes in self.channel.arrived(Direction::Up, tick) {
             self.space.hear(tick, &bytes);
         }
-        let frames = arrived(&mut self.down, tick);
+        let frames = self.channel.arrived(Direction::Down, tick);
         if self.ground_is_left(tick) {
             return;
         }
@@ -122,37 +111,23 @@ impl Apart {
         }
     }
 
-    /// A tick ends: both send.
+    /// A tick ends: both send, once.
     fn finish(&mut self, tick: Tick) {
-        let before = self.finished.replace(tick);
-        let open = self.radio.open(tick);
-        if !open || before.is_none_or(|before| before.after(1) != tick) {
-            self.ground.close();
-            self.space.close();
-        }
-        if open {
+        let first = self.finished.replace(tick).is_none_or(|finished| finished < tick);
+        if first && self.radio().open(tick) {
             if !self.ground_is_left(tick) {
-                put(&mut self.up, self.radio.carry(Direction::Up, tick, self.ground.transmit(tick)));
+                self.channel.carry(Direction::Up, tick, self.ground.transmit(tick));
             }
-            put(&mut self.down, self.radio.carry(Direction::Down, tick, self.space.transmit(tick)));
+            self.channel.carry(Direction::Down, tick, self.space.transmit(tick));
         }
         for contradiction in self.space.take_contradictions().iter().chain(&self.ground.take_contradictions()) {
             tracing::error!("{contradiction}");
         }
     }
 
-    /// Whether nobody is on the ground; who comes back to it knows what was kept.
+    /// Whether nobody is on the ground; who comes back to it was told the same, and is where the one before was.
     fn ground_is_left(&mut self, now: Tick) -> bool {
-        let presence = self.absences.at(now);
-        if presence == Presence::Back {
-            let (initial, horizon) = &self.origin;
-            match self.ground.restarted(initial, *horizon) {
-                Ok(fresh) => self.ground = fresh,
-                // Its strips were taken under the same limits.
-                Err(refusal) => tracing::error!("the ground cannot be made again: {refusal}"),
-            }
-        }
-        matches!(presence, Presence::Away(_))
+        matches!(self.absences.at(now), Presence::Away(_))
     }
 
     /// All that happens before a tick.
@@ -195,20 +170,5 @@ impl RequestKeeper for Apart {
         let reward = self.space.on_result(record);
         self.finish(record.end);
         reward
-    }
-}
-
-/// Frames that have arrived at a tick.
-fn arrived(under_way: &mut UnderWay, tick: Tick) -> Vec<Vec<u8>> {
-    let mut frames = Vec::new();
-    while let Some(entry) = under_way.first_entry().filter(|entry| *entry.key() <= tick) {
-        frames.extend(entry.remove());
-    }
-    frames
-}
-
-fn put(under_way: &mut UnderWay, frames: Vec<(Tick, Vec<u8>)>) {
-    for (tick, bytes) in frames {
-        under_way.entry(tick).or_default().push(bytes);
     }
 }

@@ -193,11 +193,6 @@ impl Catalogue {
         self.end.transmit(now)
     }
 
-    /// The radio closes.
-    pub fn close(&mut self) {
-        self.end.close();
-    }
-
     fn tell(&mut self, class: usize, down: &Down) {
         self.end.push(class, item(down, 0));
     }
@@ -211,7 +206,7 @@ impl Catalogue {
                     imaged.into_iter().for_each(|id| self.send_image(id));
                 }
                 Entry::Attempted(attempt) => self.tell(RESULTS, &Down::Attempted(attempt)),
-                Entry::Added(_) | Entry::Taken(_) => {}
+                Entry::Added(_) | Entry::Taken(_) | Entry::Told(_) => {}
             }
         }
     }

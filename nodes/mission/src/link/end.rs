@@ -102,6 +102,8 @@ pub struct End {
     debt: u64,
     /// Ticks on the air so far.
     air: u64,
+    /// The last tick at which it could send.
+    open: Option<Tick>,
     /// Tick on the air of the last frame sent; none in this pass yet.
     spoke: Option<u64>,
     /// Whether items came that are not acknowledged.
@@ -125,6 +127,7 @@ impl End {
             inn: kept.received.map(Inbox::restored),
             debt: 0,
             air: 0,
+            open: None,
             spoke: None,
             owes: false,
             counts: Counts::default(),
@@ -207,6 +210,9 @@ impl End {
 
     /// What leaves at a tick at which the radio is open. Between passes it is not called, and timers stand still.
     pub fn transmit(&mut self, now: Tick) -> Vec<Sent> {
+        if self.open.replace(now).is_none_or(|before| before.after(1) != now) {
+            self.begin_pass();
+        }
         self.air += 1;
         for out in &mut self.out {
             out.expire(self.air, self.rates.patience);
@@ -223,8 +229,8 @@ impl End {
         sent
     }
 
-    /// The radio closes: what has begun to leave is cut off, and the next pass begins with a frame.
-    pub fn close(&mut self) {
+    /// What had begun to leave when the radio closed was cut off, and each pass begins with a frame.
+    fn begin_pass(&mut self) {
         self.spoke = None;
         self.debt = 0;
     }

@@ -88,7 +88,6 @@ impl Air {
         let open = tick % (weather.pass.0 + weather.pass.1) < weather.pass.0;
         for side in [0, 1] {
             if !open {
-                self.ends[side].close();
                 continue;
             }
             for sent in self.ends[side].transmit(Tick(tick)) {

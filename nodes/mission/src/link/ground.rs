@@ -8,11 +8,13 @@ use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::StripId;
 
 use super::end::{Counts, End, Rates, Sent};
+use super::frame::CLASSES;
 use super::message::{CHANGES, Down, Housekeeping, ORDERS, Up, Wish, item, message};
 use crate::orders::action::{Act, Action, Review};
+use crate::requests::journal::Entry;
 use crate::requests::lifecycle::State;
 use crate::requests::logic::{Contradiction, RequestLogic};
-use crate::requests::refusal::Refusal;
+use crate::requests::refusal::{Refusal, check_text};
 
 /// The way of a request up, and of its image down. Times are by the clock of who noted them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -143,28 +145,41 @@ impl Ground {
     /// Changes and orders that are not known to have arrived.
     #[must_use]
     pub fn waiting(&self) -> u64 {
-        self.end.waiting().iter().sum()
+        self.waiting_by_class().iter().sum()
+    }
+
+    /// The same by class.
+    #[must_use]
+    pub fn waiting_by_class(&self) -> [u64; CLASSES] {
+        self.end.waiting()
     }
 
     /// Takes what is asked for. A request gets its number at once; what is asked of a request is decided on board.
     ///
+    /// Returns the number of the request that it is about; none for what is the planner's.
+    ///
     /// # Errors
     /// Why it is refused at once.
-    pub fn ask(&mut self, action: Action, now: Tick) -> Result<(), Refusal> {
+    pub fn ask(&mut self, action: Action, now: Tick) -> Result<Option<StripId>, Refusal> {
         self.requests.wait_until(now);
+        check_text("actor", &action.actor)?;
+        check_text("reason", &action.reason)?;
         let known = self.requests.len();
         match action.act.clone() {
             Act::Submit(_, order) => {
-                self.requests.submit(*order.clone(), now)?;
+                let id = self.requests.submit(*order.clone(), now)?;
                 self.send_order(known, *order, None, now);
+                Ok(Some(id))
             }
             Act::Replace(old, order) => {
-                self.requests.replace_when_heard(old, *order.clone(), now)?;
+                let id = self.requests.replace_when_heard(old, *order.clone(), now)?;
                 self.send_order(known, *order, Some(old), now);
+                Ok(Some(id))
             }
             Act::Cancel(id) => {
                 self.requests.still_open(id, State::CancelledByUser)?;
                 self.send_change(action, id, Wish::Cancel);
+                Ok(Some(id))
             }
             Act::Review(id, review) => {
                 let to = match review {
@@ -174,11 +189,11 @@ impl Ground {
                 };
                 self.requests.still_open(id, to)?;
                 self.send_change(action, id, Wish::Review(review));
+                Ok(Some(id))
             }
             // These are the planner's.
-            Act::SetMode(_) | Act::Decide { .. } => {}
+            Act::SetMode(_) | Act::Decide { .. } => Ok(None),
         }
-        Ok(())
     }
 
     /// Sends up the requests from number `known` + 1 on; none when what was asked for was known.
@@ -292,9 +307,14 @@ impl Ground {
         frames
     }
 
-    /// The radio closes.
-    pub fn close(&mut self) {
-        self.end.close();
+    /// Lines of the journal since the last call.
+    pub fn take_journal(&mut self) -> Vec<Entry> {
+        self.requests.take_journal()
+    }
+
+    /// Simulated time goes on.
+    pub fn wait_until(&mut self, now: Tick) {
+        self.requests.wait_until(now);
     }
 
     /// Each request with its way, in the order of their numbers.

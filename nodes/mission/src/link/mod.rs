@@ -2,6 +2,7 @@
 
 pub mod apart;
 pub mod catalogue;
+pub mod channel;
 pub mod config;
 pub mod end;
 pub mod frame;
@@ -12,6 +13,7 @@ mod outbox;
 pub mod passes;
 pub mod radio;
 pub mod response;
+pub mod told;
 
 #[cfg(test)]
 mod both_tests;

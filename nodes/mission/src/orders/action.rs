@@ -8,7 +8,7 @@ use crate::approval::Mode;
 use crate::orders::order::Order;
 
 /// Something that was asked for and taken.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Action {
     /// Simulated time at which it counted.
     pub at: Tick,
@@ -34,7 +34,7 @@ pub enum Review {
 }
 
 /// What can be asked for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Act {
     /// A strip, under the number that it got.
     Submit(StripId, Box<Order>),

@@ -1,10 +1,9 @@
 //! What counts as the same strip asked for twice.
 
-use swath_sim::world::strip::{StripId, StripRequest};
+use swath_sim::world::strip::StripRequest;
 
 use super::lifecycle::State;
-use super::logic::RequestLogic;
-use super::refusal::Refusal;
+use super::request::Request;
 use crate::orders::order::Order;
 
 /// Units of a degree in which strips are compared: about a metre.
@@ -13,25 +12,15 @@ const SAME_PLACE_PER_DEG: f64 = 1e5;
 /// Where a strip lies: latitude and longitude of its ends in those units.
 pub(super) type Place = [i32; 4];
 
-impl RequestLogic {
-    /// A submitter asks for a strip once at a time; a replacement may be for the same as what it replaces.
-    pub(super) fn check_same_strip(&self, order: &Order, replaces: Option<StripId>) -> Result<(), Refusal> {
-        let twin = replaces.and_then(|old| self.catalogue.get(old)?.linked);
-        let (ours_from, ours_until) = order.validity_ns();
-        let same = self.register.at_place(&order.request).find(|(id, known)| {
-            let (from, until) = known.order.validity_ns();
-            Some(*id) != replaces
-                && Some(*id) != twin
-                && known.order.submitter == order.submitter
-                && known.order.request.acquisition_speed_m_s == order.request.acquisition_speed_m_s
-                && ours_from < until
-                && from < ours_until
-        });
-        match same {
-            Some((id, known)) => Err(Refusal::SameStrip { id: id.0, state: known.state.name() }),
-            None => Ok(()),
-        }
-    }
+/// Whether an order asks for what a request at the same place asks for already: a submitter asks for a strip once at a
+/// time.
+pub(super) fn is_asked_again(order: &Order, known: &Request) -> bool {
+    let (ours_from, ours_until) = order.validity_ns();
+    let (from, until) = known.order.validity_ns();
+    known.order.submitter == order.submitter
+        && known.order.request.acquisition_speed_m_s == order.request.acquisition_speed_m_s
+        && ours_from < until
+        && from < ours_until
 }
 
 /// Where a strip lies; two at one place are the same strip.

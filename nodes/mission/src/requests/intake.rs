@@ -5,7 +5,7 @@ use swath_sim::requests::catalogue::{Prepared, Validity};
 use swath_sim::time::Tick;
 use swath_sim::world::strip::{StripId, StripRequest};
 
-use super::duplicates::may_be_asked_again;
+use super::duplicates::{is_asked_again, may_be_asked_again};
 use super::journal::{Added, Change, Entry, Standing};
 use super::lifecycle::State;
 use super::logic::RequestLogic;
@@ -147,6 +147,17 @@ impl RequestLogic {
     pub(super) fn insert(&mut self, prepared: Prepared, request: Request) {
         self.register.add(request, &prepared.strip, &prepared.windows);
         self.catalogue.insert(prepared);
+    }
+
+    /// A replacement may be for the same as what it replaces.
+    fn check_same_strip(&self, order: &Order, replaces: Option<StripId>) -> Result<(), Refusal> {
+        let twin = replaces.and_then(|old| self.catalogue.get(old)?.linked);
+        let mut there = self.register.at_place(&order.request);
+        let same = there.find(|(id, known)| Some(*id) != replaces && Some(*id) != twin && is_asked_again(order, known));
+        match same {
+            Some((id, known)) => Err(Refusal::SameStrip { id: id.0, state: known.state.name() }),
+            None => Ok(()),
+        }
     }
 
     pub(super) fn note_refusal(&mut self, order: Order, refusal: &Refusal, at: Tick) {

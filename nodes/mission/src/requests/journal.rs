@@ -22,6 +22,8 @@ pub enum Entry {
     Attempted(Attempt),
     /// Something that was asked for was taken.
     Taken(Box<Action>),
+    /// What the ground's end of the radio was told, as bytes; all else follows from it.
+    Told(Vec<u8>),
 }
 
 /// A request that got a number.

@@ -5,3 +5,4 @@ pub mod numbers;
 pub mod spacecraft_state;
 pub mod strip;
 pub mod task_result;
+pub mod upcoming;

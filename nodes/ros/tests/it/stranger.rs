@@ -16,6 +16,9 @@ pub struct Stranger {
 }
 
 const LITTLE_ENDIAN_WITH_DATA: u8 = 5;
+/// How many participants are announced at once, and how long there is rest then: fewer than sockets have room for.
+const CROWD_AT_ONCE: u16 = 8;
+const CROWD_REST: Duration = Duration::from_millis(4);
 
 impl Stranger {
     /// A participant that all nodes of this process in the domain hear of.
@@ -29,11 +32,30 @@ impl Stranger {
         socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         let prefix = [1, 0x12, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, 0x7a, number];
         let stranger = Self { socket, process, domain, prefix, announced_readers: 0, announced_writers: 0 };
-        let port = stranger.socket.local_addr().unwrap().port();
+        stranger.announce(lease_s);
+        std::thread::sleep(Duration::from_millis(300));
+        stranger
+    }
+
+    /// Announces so many participants to all nodes in the domain, for so many seconds.
+    pub fn announce_crowd(&mut self, count: u16, lease_s: u32) {
+        let own = self.prefix;
+        for number in 0..count {
+            self.prefix[8..10].copy_from_slice(&number.to_be_bytes());
+            self.announce(lease_s);
+            if number % CROWD_AT_ONCE == 0 {
+                std::thread::sleep(CROWD_REST);
+            }
+        }
+        self.prefix = own;
+    }
+
+    fn announce(&self, lease_s: u32) {
+        let port = self.socket.local_addr().unwrap().port();
         let mut parameters = Vec::new();
         put(&mut parameters, 0x15, &[2, 3, 0, 0]);
         put(&mut parameters, 0x16, &[1, 0x12, 0, 0]);
-        put(&mut parameters, 0x50, &stranger.gid([0, 0, 1, 0xc1]));
+        put(&mut parameters, 0x50, &self.gid([0, 0, 1, 0xc1]));
         put(&mut parameters, 0x58, &0x3f_u32.to_le_bytes());
         put(&mut parameters, 0x02, &[lease_s.to_le_bytes(), [0; 4]].concat());
         // Where it wants discovery and data.
@@ -42,9 +64,7 @@ impl Stranger {
         locator[4..6].copy_from_slice(&port.to_le_bytes());
         put(&mut parameters, 0x32, &locator);
         put(&mut parameters, 0x31, &locator);
-        stranger.discovery([0, 1, 0, 0xc7], [0, 1, 0, 0xc2], 1, parameters);
-        std::thread::sleep(Duration::from_millis(300));
-        stranger
+        self.discovery([0, 1, 0, 0xc7], [0, 1, 0, 0xc2], 1, parameters);
     }
 
     fn gid(&self, entity: [u8; 4]) -> [u8; 16] {

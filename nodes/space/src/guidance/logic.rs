@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
+use swath_mission::requests::journal::InFlight;
 use swath_sim::task::{Task, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
@@ -206,6 +207,14 @@ impl GuidanceLogic {
     #[must_use]
     pub fn strip(&self) -> Option<(StripId, &str)> {
         Some((self.executive.task()?.0.strip()?, &self.name))
+    }
+
+    /// The task in hand, if it images a strip.
+    #[must_use]
+    pub fn flown(&self) -> Option<InFlight> {
+        let (task, start) = self.executive.task()?;
+        let Task::Image { id, t_pre, t_acq, .. } = *task else { return None };
+        Some(InFlight { task: self.executive.number()?, id, start, t_pre, t_acq })
     }
 
     /// From now on this much time passes between a situation and the start of the task decided on it [ticks].
@@ -431,7 +440,7 @@ impl GuidanceLogic {
     fn may_end(&self, number: u64, state: &StateSample) -> bool {
         match self.executive.task() {
             Some((Task::Image { t_pre, .. }, start)) => {
-                self.executive.number() == Some(number) && state.tick < start.after(*t_pre)
+                self.executive.number() == Some(number) && state.tick <= start.after(*t_pre)
             }
             _ => false,
         }

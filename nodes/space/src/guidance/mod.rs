@@ -4,4 +4,5 @@ pub mod logic;
 #[cfg(test)]
 mod logic_tests;
 mod messages;
+mod radio;
 pub mod wiring;

@@ -14,6 +14,7 @@ use swath_sim::vehicle::spacecraft::StateSample;
 
 use super::logic::{Command, Effect, GuidanceLogic, Lost};
 use super::messages;
+use super::radio::RadioGate;
 use swath_mission::alarms::conditions::{back, of_health};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
@@ -71,7 +72,9 @@ struct GuidanceNode {
     points: Publisher<msg::DecisionPoint>,
     status: Publisher<msg::GuidanceStatus>,
     phases: Publisher<msg::TaskPhase>,
-    aborts: Subscription<msg::TaskAbort>,
+    /// There is none where there is a radio.
+    aborts: Option<Subscription<msg::TaskAbort>>,
+    radio: Option<RadioGate>,
     /// The last decision point, and how many launchers were told of it.
     last_point: Option<msg::DecisionPoint>,
     told_to: u64,
@@ -115,7 +118,11 @@ impl GuidanceNode {
             points: base.node.publisher(&graph::DECISION_POINT)?,
             status: base.node.publisher(&graph::GUIDANCE_STATUS)?,
             phases: base.node.publisher(&graph::TASK_PHASE)?,
-            aborts: base.node.subscription(&graph::TASK_ABORT)?,
+            aborts: match base.mission.link {
+                None => Some(base.node.subscription(&graph::TASK_ABORT)?),
+                Some(_) => None,
+            },
+            radio: RadioGate::new(&base, pace)?,
             last_point: None,
             told_to: 0,
             phase_told: None,
@@ -155,13 +162,14 @@ impl GuidanceNode {
 
     fn work(&mut self) -> Result<Duration> {
         self.tell_another_launcher()?;
-        while let Some(message) = self.aborts.take()? {
-            if self.logic.on_abort(message.task) {
-                tracing::info!("task {} is given up: {}", message.task, message.reason);
-            }
+        while let Some(message) = self.next_abort()? {
+            self.give_up(message.task, &message.reason);
         }
+        self.listen()?;
         self.take_states()?;
-        while let Some(state) = self.next_state() {
+        while self.may_look()?
+            && let Some(state) = self.next_state()
+        {
             let effects = self.logic.on_state(state);
             self.tell_health()?;
             self.carry_out(effects)?;
@@ -169,7 +177,9 @@ impl GuidanceNode {
         while let Some(message) = self.tasks.take()? {
             self.take_task(&message)?;
         }
-        self.mind_question()
+        let wait = self.mind_question()?;
+        let patience = self.radio.as_ref().and_then(RadioGate::patience);
+        Ok(patience.map_or(wait, |patience| patience.min(wait)))
     }
 
     /// A launcher that takes over learns how far the mission is; the others only answer again.
@@ -181,6 +191,37 @@ impl GuidanceNode {
             self.points.publish(point)?;
         }
         Ok(())
+    }
+
+    fn next_abort(&self) -> Result<Option<msg::TaskAbort>> {
+        Ok(self.aborts.as_ref().map_or(Ok(None), Subscription::take)?)
+    }
+
+    fn give_up(&mut self, task: u64, reason: &str) {
+        if self.logic.on_abort(task) {
+            tracing::info!("task {task} is given up: {reason}");
+        }
+    }
+
+    /// What was heard over the radio.
+    fn listen(&mut self) -> Result<()> {
+        while let Some(heard) = self.radio.as_mut().map_or(Ok(None), RadioGate::take)? {
+            if heard.abort {
+                self.give_up(heard.abort_task, &heard.reason);
+            }
+            if heard.hold && self.logic.wanted() == Some(heard.hold_task) {
+                let effects = self.logic.on_absence(u32::MAX);
+                self.carry_out(effects)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether there is a state, and the radio has been heard up to its tick, where there is one.
+    fn may_look(&mut self) -> Result<bool> {
+        let Some(tick) = self.unpaired.0.front().map(|state| state.tick) else { return Ok(false) };
+        let flown = self.logic.wanted().is_none().then(|| self.logic.flown());
+        self.radio.as_mut().map_or(Ok(true), |it| it.may_look(&self.base, tick, flown))
     }
 
     fn take_states(&mut self) -> Result<()> {
@@ -321,6 +362,8 @@ impl GuidanceNode {
     fn send(&mut self, command: &Command) -> Result<()> {
         self.base.set_now(command.tick);
         self.torques.publish(&messages::wheel_torque(&self.base.stamper, command))?;
+        let flown = self.logic.flown();
+        self.radio.as_mut().map_or(Ok(()), |it| it.answered(&self.base, command.tick, flown))?;
         let phase = (command.task, command.guidance.imaging);
         if command.has_strip && self.phase_told != Some(phase) {
             self.phase_told = Some(phase);
@@ -363,7 +406,8 @@ impl LifecycleNode for GuidanceNode {
 
     /// The wheels hold no torque. The last state waits for one who can end the mission.
     fn rest(&mut self) -> Result<()> {
-        while self.aborts.take()?.is_some() {}
+        while self.next_abort()?.is_some() {}
+        while self.radio.as_mut().map_or(Ok(None), RadioGate::take)?.is_some() {}
         while self.tasks.take()?.is_some() {}
         self.take_states()?;
         while self.unpaired.0.front().is_some_and(|state| state.tick < self.base.horizon)

@@ -68,8 +68,8 @@ struct PlannerNode {
     decisions: Publisher<msg::Decision>,
     status: Publisher<msg::PlannerStatus>,
     actions: Publisher<msg::OperatorAction>,
-    set_mode: Server<msg::SetPlannerMode>,
-    review: Server<msg::ReviewProposal>,
+    /// There are none where there is a radio: nobody on the ground reaches the planner.
+    services: Option<(Server<msg::SetPlannerMode>, Server<msg::ReviewProposal>)>,
     status_told: Option<msg::PlannerStatus>,
     strips: Vec<msg::Candidate>,
     last: Option<msg::ImagingTask>,
@@ -94,8 +94,10 @@ impl PlannerNode {
             logic: PlannerLogic::new((*base.model).clone(), planner),
             status: base.node.publisher(&graph::PLANNER_STATUS)?,
             actions: base.node.publisher(&graph::PLANNER_ACTIONS)?,
-            set_mode: base.node.server(&graph::SET_PLANNER_MODE)?,
-            review: base.node.server(&graph::REVIEW_PROPOSAL)?,
+            services: match base.mission.link {
+                None => Some((base.node.server(&graph::SET_PLANNER_MODE)?, base.node.server(&graph::REVIEW_PROPOSAL)?)),
+                Some(_) => None,
+            },
             status_told: None,
             points: base.node.subscription(&graph::DECISION_POINT)?,
             upcoming: base.node.subscription(&graph::UPCOMING_STRIPS)?,
@@ -165,13 +167,14 @@ impl PlannerNode {
 
     /// What operators say; it counts from the next decision on.
     fn take_orders(&mut self) -> Result<()> {
+        let Some((set_mode, review)) = &mut self.services else { return Ok(()) };
         let mut taken = Vec::new();
         let (at, initial) = (self.now, self.last.is_none());
         let mut note = |actor: String, act: Act| taken.push(Action { at, initial, actor, reason: String::new(), act });
         let mut set = None;
         let inactive = (self.base.lifecycle.state() != State::Active).then(|| "the planner is inactive".to_owned());
         let gate = self.logic.gate_mut();
-        self.set_mode.answer_all(|call| match (planner_mode(call.mode), &inactive) {
+        set_mode.answer_all(|call| match (planner_mode(call.mode), &inactive) {
             (_, Some(reason)) => msg::SetPlannerModeResponse { accepted: false, reason: reason.clone() },
             (Ok(mode), None) => {
                 tracing::info!("{} sets the mode to {mode:?}", call.actor);
@@ -182,7 +185,7 @@ impl PlannerNode {
             }
             (Err(error), None) => msg::SetPlannerModeResponse { accepted: false, reason: error.to_string() },
         })?;
-        self.review.answer_all(|call| match inactive.clone().map_or_else(|| review(gate, &call), Err) {
+        review.answer_all(|call| match inactive.clone().map_or_else(|| self::review(gate, &call), Err) {
             Ok(proposal) => {
                 let verb = if call.approve { "approves" } else { "rejects" };
                 tracing::info!("{} {verb} proposal {proposal}", call.actor);

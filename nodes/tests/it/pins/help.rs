@@ -4,8 +4,17 @@ use crate::pins::golden;
 use crate::pins::place::Place;
 
 /// Every program of the suite.
-pub const PROGRAMS: [&str; 7] =
-    ["swath", "swath-bag", "swath-train", "swath-spacecraft", "swath-guidance", "swath-planner", "swath-requests"];
+pub const PROGRAMS: [&str; 9] = [
+    "swath",
+    "swath-bag",
+    "swath-train",
+    "swath-spacecraft",
+    "swath-guidance",
+    "swath-planner",
+    "swath-requests",
+    "swath-catalogue",
+    "swath-link",
+];
 
 /// Appends the help of a command and of the commands below it.
 fn collect(place: &Place, command: &str, text: &mut String) {

@@ -156,7 +156,7 @@ struct Login {
 async fn login(State(server): Home, Json(login): Json<Login>) -> Result<Response, Problem> {
     let guard = &server.site.guard;
     let bearer = HeaderValue::try_from(format!("Bearer {}", login.token.trim()))
-        .map_err(|_| Problem::bad("the token holds characters that no token has"))?;
+        .map_err(|_| Problem::new(StatusCode::UNAUTHORIZED, "the token holds characters that no token has"))?;
     guard.caller(&HeaderMap::from_iter([(axum::http::header::AUTHORIZATION, bearer)]))?;
     let secure = if guard.secure() { "; Secure" } else { "" };
     let token = login.token.trim();

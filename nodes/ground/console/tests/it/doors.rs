@@ -126,6 +126,7 @@ fn a_browser_hands_in_its_token_and_gets_a_cookie_that_no_page_reads() {
     };
     assert_eq!(login("guess", "").0, 401);
     assert_eq!(login(&doors.ended, "").0, 401);
+    assert_eq!(login("\\u0007", "").0, 401, "no header holds it");
     assert_eq!(login(&doors.viewer, "Origin: https://evil.example\r\n").0, 403);
     let (status, head) = login(&doors.viewer, "");
     assert_eq!(status, 200);

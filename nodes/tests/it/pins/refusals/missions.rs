@@ -30,7 +30,6 @@ const FILES: &[Case] = &[
     (&[("m.toml", "[link]\nstations = [\"atlantis\"]")], LAUNCH),
     (&[("m.toml", "[link]\nstations = [\"tokyo\"]\nmask_deg = 91.0")], LAUNCH),
     (&[("m.toml", "[link]\nstations = [\"tokyo\"]\nuplink_bps = 0")], LAUNCH),
-    (&[("m.toml", "[link]\nstations = [\"tokyo\"]")], "swath launch m.toml --out out"),
     (&[("m.toml", "orbits = 1.0")], "swath passes m.toml"),
     (&[("m.toml", "[link]\nstations = [\"tokyo\"]")], "swath passes m.toml --hours nan"),
 ];

@@ -28,6 +28,8 @@ const MISSIONS: &[Case] = &[
     (&[], "swath-guidance --ros-args -p mission:=m.toml -p pace:=fast"),
     (&[], "swath-planner --ros-args -p mission:=m.toml -p planner:=clever"),
     (&[], "swath-spacecraft --ros-args -p mission:=m.toml -p peer_timeout_s:=0.5"),
+    (&[], "swath-catalogue --ros-args -p mission:=m.toml"),
+    (&[], "swath-link --ros-args -p mission:=m.toml"),
 ];
 
 #[test]
