@@ -286,7 +286,8 @@ impl Tap {
             }
         }
         for ((name, type_name), offers) in offers {
-            let foreign = self.selection.own_mission_only && is_of_a_mission(&name, &type_name);
+            let foreign = self.selection.own_mission_only
+                && (is_of_a_mission(&name, &type_name) || is_of_another_life(&name, self.node.names().namespace()));
             if foreign || !self.selects(&name) || self.sources.iter().any(|source| source.topic.name == name) {
                 self.passed_over.insert(name);
                 continue;
@@ -346,6 +347,14 @@ fn is_of_a_mission(topic: &str, type_name: &str) -> bool {
             None => (true, entry.name),
         };
         own && entry.type_name == type_name && topic.strip_suffix(name).is_some_and(|before| before.ends_with('/'))
+    })
+}
+
+/// Whether the topic tells of the life cycle of a node of a mission in another namespace.
+fn is_of_another_life(topic: &str, own: &str) -> bool {
+    let node = topic.strip_suffix("/transition_event").and_then(|node| node.rsplit_once('/'));
+    node.is_some_and(|(namespace, node)| {
+        namespace != own && (graph::MEMBERS.contains(&node) || node == graph::RECORDER)
     })
 }
 

@@ -39,7 +39,10 @@ impl OrderDesk {
             let answer = match self.order(base, &call, now) {
                 Ok(answer) => answer,
                 Err(reason) => {
-                    tracing::info!("{} orders {:?}, which is refused: {reason}", call.actor, call.fault);
+                    // Who orders nothing only looks whether somebody answers.
+                    if !call.fault.is_empty() {
+                        tracing::info!("{} orders {:?}, which is refused: {reason}", call.actor, call.fault);
+                    }
                     msg::OrderFaultResponse { reason: reason.to_string(), ..Default::default() }
                 }
             };
