@@ -30,13 +30,14 @@ fn what_is_ordered_on_the_way_befalls_the_mission_and_the_same_mission_flown_aga
     let mut flight = common::Running::start(launch.arg(&mission).arg("--out").arg(&out));
     common::until("the first task", || out.join("tasks.jsonl").metadata().is_ok_and(|it| it.len() > 0).then_some(()));
     let orders = [
-        ("wheel2:weak 60%+300s", "wheel y", 10),
+        ("wheel2:weak 60%+300s", "wheel y", 600),
         ("startracker:out+60s", "star tracker out", 4),
         ("gyro:bias 0.02deg/s+120s", "gyro biased", 10),
         ("planner:hang+200s", "planner lost", 0),
         ("guidance:kill+20s", "guidance lost", 0),
         ("request_manager:kill", "request_manager lost", 0),
         ("spacecraft:kill", "spacecraft lost", 0),
+        ("recorder:kill", "recorder lost", 0),
     ];
     let mut begun = Vec::new();
     for (fault, alarm, _) in orders {
@@ -60,6 +61,7 @@ fn what_is_ordered_on_the_way_befalls_the_mission_and_the_same_mission_flown_aga
     let mut refly = common::command("swath", "0");
     let again = common::succeed(refly.arg("refly").arg(out.join("bag")));
     assert!(again.contains("tasks are the same, byte by byte"), "{again}");
+    assert!(again.contains("tasks were flown while nothing was recorded"), "{again}");
 }
 
 #[test]

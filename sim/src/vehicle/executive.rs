@@ -89,9 +89,21 @@ impl Executive {
     fn start(&mut self, task: Task, sight: &Sight<'_>) {
         let seen = self.look(sight);
         self.guidance.start(task, sight.now, &seen);
-        let Some(truth) = sight.truth else { return };
+        let Some(truth) = sight.truth else {
+            self.judge = None;
+            return;
+        };
         let guidance = &self.guidance;
         self.judge.get_or_insert_with(|| Box::new(guidance.clone())).start(task, sight.now, truth);
+    }
+
+    /// Who judges the task in hand by the truth, with the truth. Sensors that go wrong on the way were exact before, so
+    /// that what guidance has seen until then was true.
+    #[inline]
+    fn judge<'a>(&mut self, sight: &Sight<'a>) -> Option<(&mut Guidance, &'a BodyState)> {
+        let truth = sight.truth?;
+        let guidance = &self.guidance;
+        Some((self.judge.get_or_insert_with(|| Box::new(guidance.clone())), truth))
     }
 
     /// The task in hand and the tick at which it begins.
@@ -117,11 +129,8 @@ impl Executive {
         let Active { number, task, start, begun } = self.active.take()?;
         let (now, r_BN_N) = (sight.now, &sight.r_BN_N);
         let body = self.look(sight);
+        let judged = self.judge(sight).and_then(|(judge, truth)| judge.finish(now, r_BN_N, truth));
         let seen = self.guidance.finish(now, r_BN_N, &body);
-        let judged = match (&mut self.judge, sight.truth) {
-            (Some(judge), Some(truth)) => judge.finish(now, r_BN_N, truth),
-            _ => None,
-        };
         let outcome = judged.or(seen).filter(|_| begun).unwrap_or(TaskOutcome::NOT_BEGUN);
         Some(TaskRecord::new(number, &task, start.min(now), now, outcome))
     }
@@ -137,7 +146,7 @@ impl Executive {
             let task = active.task;
             self.start(task, sight);
         }
-        if let (Some(judge), Some(truth)) = (&mut self.judge, sight.truth) {
+        if let Some((judge, truth)) = self.judge(sight) {
             judge.tick(sight.now, &sight.r_BN_N, truth);
         }
         let Some(watch) = &mut self.watch else {

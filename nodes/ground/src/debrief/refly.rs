@@ -1,6 +1,6 @@
 //! `swath refly`: a recorded mission flown again in process, beside what was recorded.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -12,6 +12,7 @@ use serde::Serialize;
 use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError, PlannerSpec};
 use swath_sim::task::{FailureReason, SettledTask, Totals};
 use swath_sim::time::Tick;
+use swath_sim::world::strip::StripId;
 
 use super::recorded::{Recorded, RecordedArgs};
 use swath_mission::approval::{Gate, GatedPlanner};
@@ -60,6 +61,9 @@ pub struct Comparison {
     pub identical: bool,
     /// Whether the recording reaches the mission's end.
     pub complete: bool,
+    /// Tasks that were flown while nothing was recorded: they are not compared.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub not_recorded: usize,
     /// Number of the first task that differs.
     pub first_difference: Option<u64>,
     /// Totals of the recording.
@@ -135,10 +139,11 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Resul
     let faults = recorded.mission.faults.clone().within_one_process();
     let mission = Mission { faults, ..recorded.mission.clone() };
     let mut flight = InProcessMission::with_actions(&mission, actions)?;
+    let numbered: BTreeMap<u64, _> = recorded.tasks.iter().map(|(task, _)| (task.record.task, &task.record)).collect();
     let mut tasks = Vec::new();
     loop {
         // A task that was given up then is given up now, at the same tick.
-        let then = recorded.tasks.get(tasks.len()).map(|(task, _)| &task.record).filter(|_| own);
+        let then = numbered.get(&(tasks.len() as u64)).filter(|_| own);
         let given_up = then.filter(|then| then.outcome.failure == Some(FailureReason::Interrupted));
         match flight.step(&mut planner, given_up.map_or(Tick(u64::MAX), |then| then.end))? {
             Some(task) => tasks.push(task),
@@ -159,6 +164,10 @@ impl Planner for Watching {
         self.planner.name()
     }
 
+    fn forget(&mut self) {
+        self.planner.forget();
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let now = context.situation.now;
         while let Some(action) = self.operators.pop_front_if(|action| action.initial || action.at < now) {
@@ -175,31 +184,29 @@ impl Planner for Watching {
 }
 
 fn compare(recorded: &Recorded, flown: &Flown, planner: &PlannerSpec) -> Result<Comparison> {
-    // A recording that was cut short is compared as far as it goes.
-    let count = match recorded.complete {
-        true => recorded.tasks.len().max(flown.tasks.len()),
-        false => recorded.tasks.len(),
-    };
+    let lines: BTreeMap<u64, &TaskLine> = recorded.tasks.iter().map(|(_, line)| (line.task, line)).collect();
+    // A recording that was cut short is compared as far as it goes, and one with a gap around it.
+    let last = lines.keys().next_back().map_or(0, |last| last + 1);
+    let end = if recorded.complete { last.max(flown.tasks.len() as u64) } else { last };
+    let is_compared = |task: u64| lines.contains_key(&task) || (last..end).contains(&task);
     let mut decisions = Vec::new();
-    for task in 0..count {
-        let line = |tasks: &[(SettledTask, TaskLine)]| tasks.get(task).map(|(_, line)| line.clone());
-        let (then, now) = (line(&recorded.tasks), line(&flown.tasks));
+    for task in (0..end).filter(|task| is_compared(*task)) {
+        let then = lines.get(&task).map(|line| (*line).clone());
+        let now = flown.tasks.get(task as usize).map(|(_, line)| line.clone());
         let bytes = |line: &Option<TaskLine>| line.as_ref().map(json_line).transpose();
-        let offered = recorded.offers.get(&(task as u64));
+        let offered = recorded.offers.get(&task);
         let offered = offered.map(|offer| offer.candidates.iter().map(|candidate| candidate.strip.id).collect());
         decisions.push(Pair {
-            task: task as u64,
+            task,
             same: bytes(&then)? == bytes(&now)?,
-            same_candidates: offered.as_ref() == flown.candidates.get(task),
+            same_candidates: offered.as_ref() == flown.candidates.get(task as usize),
             recorded: then,
             reflown: now,
         });
     }
-    let flown = &flown.tasks[..flown.tasks.len().min(count)];
-    let strips = |tasks: &[(SettledTask, TaskLine)]| -> BTreeSet<_> {
-        tasks.iter().map(|(task, _)| &task.record).filter(|it| it.success()).filter_map(|it| it.strip).collect()
-    };
-    let (then, now) = (strips(&recorded.tasks), strips(flown));
+    let then: Vec<_> = recorded.tasks.iter().map(|(task, _)| task).collect();
+    let now: Vec<_> = flown.tasks.iter().map(|(task, _)| task).filter(|it| is_compared(it.record.task)).collect();
+    let (then_imaged, now_imaged) = (imaged(&then), imaged(&now));
     Ok(Comparison {
         mission: recorded.mission.name.clone(),
         seed: recorded.mission.seed,
@@ -207,19 +214,30 @@ fn compare(recorded: &Recorded, flown: &Flown, planner: &PlannerSpec) -> Result<
         reflown_planner: planner.to_string(),
         identical: decisions.iter().all(|pair| pair.same),
         complete: recorded.complete,
+        not_recorded: (0..last).filter(|task| !lines.contains_key(task)).count(),
         first_difference: decisions.iter().find(|pair| !pair.same).map(|pair| pair.task),
-        recorded: totals(&recorded.tasks),
-        reflown: totals(flown),
-        imaged_by_one: (then.difference(&now).count(), now.difference(&then).count()),
+        recorded: totals(&then),
+        reflown: totals(&now),
+        imaged_by_one: (then_imaged.difference(&now_imaged).count(), now_imaged.difference(&then_imaged).count()),
         decisions,
         period_s: recorded.model.period.seconds(),
     })
 }
 
-fn totals(tasks: &[(SettledTask, TaskLine)]) -> Totals {
+fn totals(tasks: &[&SettledTask]) -> Totals {
     let mut totals = Totals::default();
-    tasks.iter().for_each(|(task, _)| totals.add(task));
+    tasks.iter().for_each(|task| totals.add(task));
     totals
+}
+
+/// The strips that were imaged.
+fn imaged(tasks: &[&SettledTask]) -> BTreeSet<StripId> {
+    tasks.iter().map(|task| &task.record).filter(|it| it.success()).filter_map(|it| it.strip).collect()
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl Comparison {
@@ -230,12 +248,19 @@ impl Comparison {
         if !self.complete {
             text += "the recording ends before the mission: compared as far as it goes\n";
         }
+        if self.not_recorded > 0 {
+            _ = writeln!(
+                text,
+                "{} tasks were flown while nothing was recorded: they are not compared",
+                self.not_recorded
+            );
+        }
         self.write_totals(&mut text);
         match self.first_difference {
             None => _ = writeln!(text, "\nall {} tasks are the same, byte by byte", self.decisions.len()),
             Some(first) => {
-                let pair = &self.decisions[first as usize];
-                let among = if pair.same_candidates { "among the same strips" } else { "among other strips" };
+                let same_candidates = self.decisions.iter().any(|pair| pair.task == first && pair.same_candidates);
+                let among = if same_candidates { "among the same strips" } else { "among other strips" };
                 _ = writeln!(text, "\nfirst difference: decision {first}, {among}");
             }
         }
