@@ -7,6 +7,7 @@ mod output;
 mod over_dds;
 mod process;
 mod progress;
+mod start;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,8 +21,8 @@ use swath_sim::task::Totals;
 use swath_sim::time::Tick;
 
 use output::{Flown, OutputFolder};
-use over_dds::Wishes;
 use progress::Progress;
+use start::Wishes;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::fallback::{GuardedPlanner, Policies, made_instead};
 use swath_mission::file::Mission;

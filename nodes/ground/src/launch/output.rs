@@ -14,6 +14,9 @@ use swath_mission::orders::import;
 use swath_mission::orders::order::Order;
 use swath_mission::outcome::{Summary, TaskLine};
 
+/// The request manager's store in the folder.
+pub const STORE: &str = "requests.sqlite";
+
 /// A mission that was flown, to its end or until something went wrong.
 pub struct Flown {
     /// What came of it.
