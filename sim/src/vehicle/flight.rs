@@ -226,12 +226,13 @@ mod tests {
     use crate::config::SimConfig;
     use crate::rng;
     use crate::vehicle::errors::PlantErrors;
+    use crate::vehicle::faults::{FOR_GOOD, Fault, TimedFault};
     use crate::vehicle::guidance::Guidance;
     use crate::vehicle::initial::InitialState;
     use crate::world::strip::{StripId, StripRequest};
 
-    #[test]
-    fn a_noisy_flight_is_judged_by_the_true_attitude() {
+    /// A model, its spacecraft, and a task of it.
+    fn to_fly() -> (Model, Spacecraft, Task) {
         let model = Model::new(SimConfig::default()).unwrap();
         let initial = InitialState::draw(&model.config, &mut rng::stream(1, rng::INITIAL_STATE));
         let request = StripRequest {
@@ -244,8 +245,36 @@ mod tests {
             bidirectional: false,
         };
         let strip = request.to_strip(&model.config.requests, model.config.earth.radius_m).unwrap();
-        let task = Task::Image { id: StripId(1), strip, t_pre: 200, t_acq: 100 };
-        let mut spacecraft = Spacecraft::new(&model, &initial);
+        let spacecraft = Spacecraft::new(&model, &initial);
+        (model, spacecraft, Task::Image { id: StripId(1), strip, t_pre: 200, t_acq: 100 })
+    }
+
+    #[test]
+    fn a_sensor_that_fails_on_the_way_is_judged_alike_whenever_that_is_known() {
+        let (model, spacecraft, task) = to_fly();
+        let out = TimedFault { fault: Fault::StarTrackerOut, from: Tick(250), until: FOR_GOOD };
+        let flown = |known_from: u64| {
+            let mut flight = Flight::new(&model, spacecraft.clone());
+            flight.begin(task);
+            let mut seen = 0.0_f64;
+            while flight.now() < Tick(u64::from(task.ticks())) {
+                if flight.now() == Tick(known_from) {
+                    flight.spacecraft.suffer([out]);
+                }
+                let tick = flight.tick();
+                seen = seen.max(if tick.imaging { tick.error.sigma_BR.norm() } else { 0.0 });
+            }
+            let outcome = flight.executive.finish(&sight(&mut flight.spacecraft)).unwrap().outcome;
+            (outcome, seen)
+        };
+        let (known_before, seen) = flown(1);
+        assert_eq!(known_before, flown(249).0);
+        assert_ne!(known_before.max_attitude_error, seen, "what guidance saw is not what was");
+    }
+
+    #[test]
+    fn a_noisy_flight_is_judged_by_the_true_attitude() {
+        let (model, mut spacecraft, task) = to_fly();
         spacecraft.differ(&model, &PlantErrors::noise(), 1).unwrap();
         let mut flight = Flight::new(&model, spacecraft);
         let mut by_hand = flight.clone();
