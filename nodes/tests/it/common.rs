@@ -4,11 +4,21 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU16, Ordering};
 
-/// A DDS domain of this test's own, from 100 to 229: tests run side by side, and so do those of other checkouts.
+/// A DDS domain of this test's own, from 100 to 229, in which nobody is yet: tests run side by side, and so do those of
+/// other checkouts.
 pub fn domain() -> String {
     static NEXT: AtomicU16 = AtomicU16::new(0);
     let first = std::process::id() % 13 * 10;
-    (100 + (first + u32::from(NEXT.fetch_add(1, Ordering::Relaxed))) % 130).to_string()
+    let domains = std::iter::repeat_with(|| NEXT.fetch_add(1, Ordering::Relaxed)).take(130);
+    let domain = domains.map(|next| 100 + (first + u32::from(next)) % 130).find(|domain| !is_used(*domain));
+    domain.expect("there are participants in every domain").to_string()
+}
+
+/// Whether somebody listens where participants of a domain announce themselves.
+fn is_used(domain: u32) -> bool {
+    let table = std::fs::read_to_string("/proc/self/net/udp").unwrap();
+    let port = format!(":{:04X}", 7400 + 250 * domain);
+    table.lines().filter_map(|line| line.split_whitespace().nth(1)).any(|address| address.ends_with(&port))
 }
 
 /// An address of this machine that nobody uses.
