@@ -2,6 +2,7 @@
 //! an outside ROS 2 peer (CycloneDDS).
 
 use std::path::Path;
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -187,14 +188,18 @@ fn the_recorder_has_a_gap(bag: &Path) {
     assert!(times.is_sorted(), "the clock never steps back");
 }
 
+/// A planner alone, which does not start by itself.
+fn planner_that_waits(folder: &Path, domain: &str) -> Child {
+    let mission = format!("mission:={}", common::write_mission(folder, MISSION).display());
+    let mut planner = common::command("swath-planner", domain);
+    planner.args(["--ros-args", "-p", &mission, "-p", "autostart:=false"]).spawn().unwrap()
+}
+
 #[test]
 fn a_node_that_does_not_start_by_itself_waits_for_its_manager() {
     let folder = tempfile::tempdir().unwrap();
-    let mission = common::write_mission(folder.path(), MISSION);
     let domain = common::domain();
-    let mut planner = common::command("swath-planner", &domain);
-    planner.args(["--ros-args", "-p", &format!("mission:={}", mission.display()), "-p", "autostart:=false"]);
-    let mut planner = planner.spawn().unwrap();
+    let mut planner = planner_that_waits(folder.path(), &domain);
     let seen = manage(&domain, "/swath/planner", &["activate", "configure", "activate", "deactivate", "cleanup"]);
     let available =
         json!([[1, "configure", "unconfigured", "configuring"], [5, "shutdown", "unconfigured", "shuttingdown"]]);
@@ -212,11 +217,8 @@ fn a_node_that_does_not_start_by_itself_waits_for_its_manager() {
 #[ignore = "needs the program ros2 of a ROS 2 installation on the PATH"]
 fn ros2_lifecycle_manages_a_node() {
     let folder = tempfile::tempdir().unwrap();
-    let mission = common::write_mission(folder.path(), MISSION);
     let domain = common::domain();
-    let mut planner = common::command("swath-planner", &domain);
-    planner.args(["--ros-args", "-p", &format!("mission:={}", mission.display()), "-p", "autostart:=false"]);
-    let mut planner = planner.spawn().unwrap();
+    let mut planner = planner_that_waits(folder.path(), &domain);
     let ros2 = |words: &[&str]| {
         let mut ros2 = std::process::Command::new("ros2");
         ros2.arg("lifecycle").args(words).env("ROS_DOMAIN_ID", &domain).env("ROS_LOCALHOST_ONLY", "1");
