@@ -7,24 +7,26 @@
 //! of the same mission in one process.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
+#[path = "common/company.rs"]
+mod company;
 #[path = "common/flight.rs"]
 mod flight;
 #[path = "common/soak.rs"]
 mod soak;
 
-use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use flight::{Flight, python, signal};
-use serde_json::{Value, json};
+use company::{Kind, Pairing};
+use flight::{python, signal};
+use serde_json::Value;
 
 const DOMAIN: u16 = 149;
 const MISSION: &str = "planner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";
 /// Orbits and paces of the two kinds of missions: twenty seconds each.
-const KINDS: [(&str, &str, &str); 2] = [("lockstep", "20", "0"), ("paced", "2", "500")];
+const KINDS: [Kind; 2] = [("lockstep", "20", "0"), ("paced", "2", "500")];
 const STATES: &str = "/swath/spacecraft/state";
 
 fn main() -> Result<()> {
@@ -32,49 +34,29 @@ fn main() -> Result<()> {
 }
 
 fn measure(seeds: std::ops::Range<u64>) -> Result<Value> {
-    let folder = tempfile::tempdir()?;
-    let mission = folder.path().join("mission.toml");
-    std::fs::write(&mission, MISSION)?;
-    let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    let mut differ = 0;
-    for seed in seeds {
-        for (kind, orbits, pace) in KINDS {
-            let words = ["--seed", &seed.to_string(), "--orbits", orbits, "--pace", pace, "--no-bag"];
-            let out = |name: &str| folder.path().join(format!("{kind}-{seed}-{name}"));
-            let alone = Flight::launch(&mission, &out("in-process"), DOMAIN, &[&words[..], &["--in-process"]].concat());
-            let (_, _, expected) = alone?.end()?;
-            let mut fly = |name: &str, guests: &[Habit]| -> Result<f64> {
-                let (factor, tasks) = fly(&mission, &out(name), &words, guests)?;
-                differ += u64::from(tasks != expected);
-                eprintln!("{kind}, seed {seed}, {name}: {factor:.0} times real time");
-                Ok(factor)
-            };
-            let (alone, stopped) = (fly("alone", &[])?, fly("one-stopped", &[Habit::Stopped])?);
-            let (healthy, mixed) = (fly("ten-healthy", &[Habit::Healthy; 10])?, fly("ten-mixed", &Habit::MIXED)?);
-            shares.entry(format!("{kind}_one_stopped_share")).or_default().push(stopped / alone);
-            shares.entry(format!("{kind}_ten_mixed_share")).or_default().push(mixed / healthy);
-        }
-    }
-    let mut result = json!(shares);
-    result["missions_with_other_tasks"] = differ.into();
-    Ok(result)
+    company::measure(seeds, (MISSION, &KINDS, DOMAIN), |mission| {
+        let mut fly = |name: &str, guests: &[Habit]| fly(mission, name, guests);
+        let (alone, stopped) = (fly("alone", &[])?, fly("one-stopped", &[Habit::Stopped])?);
+        let (healthy, mixed) = (fly("ten-healthy", &[Habit::Healthy; 10])?, fly("ten-mixed", &Habit::MIXED)?);
+        mission.share("one_stopped", stopped / alone);
+        mission.share("ten_mixed", mixed / healthy);
+        Ok(())
+    })
 }
 
-/// Flies a mission with guests: its speed and its tasks.
-fn fly(mission: &Path, out: &Path, words: &[&str], guests: &[Habit]) -> Result<(f64, String)> {
+/// Flies a mission with guests; its speed.
+fn fly(mission: &mut Pairing<'_>, name: &str, guests: &[Habit]) -> Result<f64> {
     let mut guests = guests.iter().map(|habit| Guest::start(*habit)).collect::<Result<Vec<_>>>()?;
     for guest in &mut guests {
         ensure!(guest.line()? == "ready", "a reader did not come up");
     }
-    let mut flight = Flight::launch(mission, out, DOMAIN, words)?;
+    let mut flight = mission.launch(name)?;
     flight.wait_for_tasks(1)?;
     for guest in &mut guests {
         ensure!(guest.line()? == "reading", "a reader does not read");
     }
     guests.iter().for_each(Guest::misbehave);
-    let (well, summary, tasks) = flight.end()?;
-    ensure!(well, "the mission failed: {}", flight.said());
-    Ok((summary.real_time_factor, tasks))
+    mission.land(name, flight)
 }
 
 #[derive(Clone, Copy)]

@@ -16,6 +16,7 @@ use swath_ros::{Cdr, decode};
 use swath_sim::vehicle::faults::FOR_GOOD;
 
 use crate::flight::swath;
+use crate::operator::SUBMITTER;
 
 /// Checks what must hold of every mission that has ended: `requests` were acknowledged.
 pub fn check(out: &Path, requests: &BTreeMap<String, u64>) -> Result<()> {
@@ -72,7 +73,7 @@ fn check_requests(out: &Path, acknowledged: &BTreeMap<String, u64>) -> Result<()
     let kept: Value = serde_json::from_str(&export(&[])?)?;
     let features = kept["features"].as_array().context("the store has no features")?;
     let mut ids = BTreeMap::new();
-    for properties in features.iter().map(|it| &it["properties"]).filter(|it| it["submitter"] == "chaos") {
+    for properties in features.iter().map(|it| &it["properties"]).filter(|it| it["submitter"] == SUBMITTER) {
         let reference = properties["client_ref"].as_str().unwrap_or_default().to_owned();
         let id = properties["id"].as_u64().unwrap_or_default();
         ensure!(ids.insert(reference.clone(), id).is_none(), "{reference} is kept twice");

@@ -10,6 +10,8 @@ mod flight;
 mod look;
 mod mission;
 mod operator;
+#[path = "../common/request.rs"]
+mod request;
 
 use std::path::Path;
 use std::process::ExitCode;

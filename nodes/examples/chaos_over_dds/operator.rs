@@ -7,8 +7,12 @@ use anyhow::{Result, ensure};
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Client, Environment, Node, RosArgs, graph};
 
+use crate::request::request;
+
 /// How long an answer may take before the call is made again.
 const PATIENCE: Duration = Duration::from_millis(500);
+/// Who asks.
+pub const SUBMITTER: &str = "chaos";
 /// Requests of a call.
 const BATCH: u64 = 5;
 
@@ -40,7 +44,7 @@ impl Operator {
 
     /// Asks for some strips; without an answer, for the same ones the next time.
     pub fn turn(&mut self) -> Result<()> {
-        let requests: Vec<_> = (self.next..self.next + BATCH).map(request).collect();
+        let requests: Vec<_> = (self.next..self.next + BATCH).map(|number| request(SUBMITTER, number)).collect();
         let call = msg::SubmitStripsRequest { requests: requests.clone() };
         let Ok(answer) = self.client.call(call, PATIENCE) else { return Ok(()) };
         if answer.reason_code != 0 {
@@ -55,23 +59,5 @@ impl Operator {
         self.next += BATCH;
         std::thread::sleep(Duration::from_millis(20));
         Ok(())
-    }
-}
-
-fn request(number: u64) -> msg::StripRequest {
-    // Spread over the globe so that no two are the same strip.
-    let latitude = (number * 37 % 800) as f64 / 10.0 - 40.0;
-    let longitude = (number * 101 % 3500) as f64 / 10.0 - 175.0;
-    msg::StripRequest {
-        client_ref: format!("c{number}"),
-        submitter: "chaos".to_owned(),
-        name: format!("strip {number}"),
-        start_latitude_deg: latitude,
-        start_longitude_deg: longitude,
-        end_latitude_deg: latitude + 1.0,
-        end_longitude_deg: longitude + 1.5,
-        priority: 0.5,
-        acquisition_speed: 3000.0,
-        ..msg::StripRequest::default()
     }
 }

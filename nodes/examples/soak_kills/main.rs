@@ -12,6 +12,8 @@ mod look;
 #[path = "../chaos_over_dds/operator.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod operator;
+#[path = "../common/request.rs"]
+mod request;
 #[path = "../common/soak.rs"]
 mod soak;
 mod witness;

@@ -10,29 +10,12 @@ use swath_msgs::swath_msgs as msg;
 use swath_ros::{Environment, Node, RosArgs, graph};
 
 use crate::common;
+use crate::request::request;
 
 /// Moments between kills: the same in each run, spread over 0.3 to 3 s.
 fn pause(kill: u64) -> Duration {
     let mixed = kill.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
     Duration::from_millis(300 + mixed % 2700)
-}
-
-fn request(number: u64) -> msg::StripRequest {
-    // Spread over the globe so that no two are the same strip.
-    let latitude = (number * 37 % 800) as f64 / 10.0 - 40.0;
-    let longitude = (number * 101 % 3500) as f64 / 10.0 - 175.0;
-    msg::StripRequest {
-        client_ref: format!("k{number}"),
-        submitter: "killer".to_owned(),
-        name: format!("strip {number}"),
-        start_latitude_deg: latitude,
-        start_longitude_deg: longitude,
-        end_latitude_deg: latitude + 1.0,
-        end_longitude_deg: longitude + 1.5,
-        priority: 0.5,
-        acquisition_speed: 3000.0,
-        ..msg::StripRequest::default()
-    }
 }
 
 /// The process of the request manager that flies with a store.
@@ -143,7 +126,7 @@ fn submit_until(stop: &std::sync::atomic::AtomicBool, domain: &str) -> (BTreeSet
     let (mut submitted, mut acknowledged) = (BTreeSet::new(), BTreeMap::new());
     let mut first = 0;
     while !stop.load(std::sync::atomic::Ordering::Relaxed) {
-        let requests: Vec<_> = (first..first + 5).map(request).collect();
+        let requests: Vec<_> = (first..first + 5).map(|number| request("killer", number)).collect();
         submitted.extend(requests.iter().map(|request| request.client_ref.clone()));
         let call = msg::SubmitStripsRequest { requests: requests.clone() };
         let Ok(answer) = client.call(call, Duration::from_millis(500)) else { continue };

@@ -29,6 +29,8 @@ mod pins;
 mod radio;
 mod readme;
 mod recorded;
+#[path = "../../examples/common/request.rs"]
+mod request;
 mod start_and_end;
 mod storm;
 #[path = "../../ros/tests/it/stranger.rs"]
