@@ -66,6 +66,8 @@ fn first<E: DeserializeOwned>(bytes: &[u8]) -> Option<(E, &[u8])> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
 
     #[test]
@@ -85,5 +87,16 @@ mod tests {
         journal.add(&entries[0]).unwrap();
         assert_eq!(Journal::<(u64, String)>::open(&path, true).unwrap().1.len(), 3);
         assert!(Journal::<(u64, String)>::open(&path, false).unwrap().1.is_empty());
+    }
+
+    #[test]
+    fn commands_of_torque_come_back_to_the_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("spacecraft.commands");
+        let commands = [Vector3::new(0.1, -0.2, 0.3), Vector3::new(f64::MIN_POSITIVE, -0.0, 1e300)];
+        let mut journal = Journal::open(&path, false).unwrap().0;
+        commands.iter().for_each(|command| journal.add(command).unwrap());
+        let bits = |all: &[Vector3<f64>]| all.iter().flat_map(|it| it.iter().map(|x| x.to_bits())).collect::<Vec<_>>();
+        assert_eq!(bits(&Journal::open(&path, true).unwrap().1), bits(&commands));
     }
 }

@@ -267,7 +267,6 @@ impl RequestNode {
             // The satellite does not wait for room: it flies on with what nobody but it was promised.
             let (flies, waits) = self.outbox.drain(..).partition(|(_, outgoing)| outgoing.is_of_flight());
             self.outbox = waits;
-            let flies: VecDeque<_> = flies;
             ready.extend(flies.into_iter().map(|(_, outgoing)| outgoing));
         }
         for outgoing in ready {

@@ -1,6 +1,5 @@
 //! The spacecraft node: dynamics, wheels, orbit and the clock.
 
-pub mod journal;
 pub mod logic;
 mod orders;
 mod telemetry;

@@ -4,16 +4,17 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use nalgebra::Vector3;
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
 use swath_node::messages::spacecraft_state::spacecraft_state;
 use swath_ros::{Publisher, RosError, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 
-use super::journal::Journal;
 use super::logic::SpacecraftLogic;
 use super::orders::OrderDesk;
 use super::telemetry::{self, Telemetry};
+use crate::journal::Journal;
 use swath_mission::alarms::conditions::back;
 use swath_mission::faults::FaultPlan;
 use swath_mission::faults::grammar::Process;
@@ -108,7 +109,7 @@ struct SpacecraftNode {
     resend_after: Duration,
     unanswered: VecDeque<StateSample>,
     /// There is one where somebody would start the spacecraft again.
-    journal: Option<Journal>,
+    journal: Option<Commands>,
     stage: Stage,
     /// When a tick was flown, or a state sent again, last.
     progress: Instant,
@@ -362,16 +363,19 @@ fn without_guidance(base: &MissionNode) -> Vec<(Tick, Tick)> {
     lost.iter().map(|(it, _)| (it.from, back(it))).collect()
 }
 
-/// The file of the commands that were flown.
+/// The commands that were flown [N m], kept so that a spacecraft that is started again goes on where the one before was: the
+/// state follows from them.
+type Commands = Journal<Vector3<f64>>;
+/// Their file.
 const JOURNAL: &str = "spacecraft.commands";
 
 /// A spacecraft where the one before was, if there was one, and the states that may be without an answer, but for the last.
 fn take_up(
     base: &MissionNode,
     mut logic: SpacecraftLogic,
-) -> Result<(Option<Journal>, VecDeque<StateSample>, SpacecraftLogic)> {
+) -> Result<(Option<Commands>, VecDeque<StateSample>, SpacecraftLogic)> {
     let Some(path) = base.keeps(JOURNAL) else { return Ok((None, VecDeque::new(), logic)) };
-    let (journal, flown) = Journal::open(&path, base.goes_on())?;
+    let (journal, flown) = Commands::open(&path, base.goes_on())?;
     let mut before = None;
     for command in &flown {
         before = Some(logic.sample());
