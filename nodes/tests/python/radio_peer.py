@@ -98,6 +98,7 @@ def disturbed(message, rng):
 
 
 def main():
+    kinds = tuple(kind for _, kind in TOPICS)
     participant = DomainParticipant(int(sys.argv[1]))
     reliable = Qos(Policy.Reliability.Reliable(duration(milliseconds=10)), Policy.History.KeepLast(1000))
     ends = []
@@ -111,8 +112,8 @@ def main():
     while not ended:
         for name, reader, writer, held in ends:
             for message in reader.take(100):
-                # What it hears of itself is not sent once more.
-                if repr(message) in own:
+                # Among them are notes that a writer has gone, and what it hears of itself, which is not sent once more.
+                if not isinstance(message, kinds) or repr(message) in own:
                     continue
                 heard[name] += 1
                 held.append(message)
