@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context as _, Error, Result, bail};
+use anyhow::{Context as _, Error, Result};
 use clap::Args;
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::requests::scenario::ScenarioConfig;
@@ -140,9 +140,6 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         mission.faults.fits_one_process()?;
     } else {
         mission.faults.fits_dds()?;
-        if mission.sim.resources.is_some() {
-            bail!("a mission with [resources] flies in one process only: add --in-process");
-        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
