@@ -74,3 +74,18 @@ fn an_empty_battery_is_safe_mode_and_a_spacecraft_that_is_started_again_lives_on
     let (tasks, ..) = flown_alike(folder.path(), "guidance", &format!("{MISSION}{BSK}{faults}"), "", "frugal");
     assert!(tasks.contains("interrupted"), "{tasks}");
 }
+
+/// One command flies the example, and another one flies it without DDS.
+#[test]
+fn the_example_flies() {
+    let folder = tempfile::tempdir().unwrap();
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/missions/resources.toml");
+    let out = |kind: &str| folder.path().join(kind);
+    tasks(&mission, &out("dds"), &["--orbits", "1"]);
+    tasks(&mission, &out("in-process"), &["--orbits", "1", "--in-process"]);
+    assert_eq!(left(&out("dds")), left(&out("in-process")));
+    let topics = common::succeed(common::command("swath-bag", "0").arg("info").arg(out("dds").join("bag")));
+    for topic in ["/swath/spacecraft/battery", "/swath/spacecraft/resources"] {
+        assert!(topics.contains(topic), "{topics}");
+    }
+}

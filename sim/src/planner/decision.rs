@@ -142,7 +142,7 @@ pub trait Planner {
         false
     }
 
-    /// Whether it sees to data and momentum by itself, so that the shield sees to the battery alone.
+    /// Whether it sees to data by itself, so that the shield sees to battery and momentum alone.
     fn minds_resources(&self) -> bool {
         false
     }

@@ -13,7 +13,7 @@ use crate::vehicle::resources::ResourceState;
 /// less what its flight takes of both, and is flown unless charging pays more a second: so the satellite charges where the
 /// Sun is low over what it images, where there is little to image, and where it points at the Sun already. With a
 /// body-fixed antenna it sends all at once, as late in a contact as that can be, or as soon as the storage is half full.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Frugal {
     search: BeamSearch,
     tariff: Tariff,
@@ -37,7 +37,7 @@ pub struct Tariff {
 
 impl Default for Tariff {
     fn default() -> Self {
-        Self { kilojoule: 0.02, reserve: 0.1, scale: 0.2, hundredth: 0.5, storage_scale: 0.3 }
+        Self { kilojoule: 0.005, reserve: 0.05, scale: 0.2, hundredth: 0.3, storage_scale: 0.3 }
     }
 }
 
@@ -59,6 +59,13 @@ const TURN_S: f64 = 60.0;
 const TASK_S: f64 = 100.0;
 /// Share of the storage from which on it is sent at once.
 const FULL_ENOUGH: f64 = 0.5;
+
+impl Default for Frugal {
+    /// Narrower than the beam that pays for nothing: what energy costs is known of fewer sequences in the same time.
+    fn default() -> Self {
+        Self::new(BeamSearch { width: 4, depth: 3, budget: 60_000 }, Tariff::default())
+    }
+}
 
 impl Frugal {
     /// A planner with no experience yet.
@@ -125,12 +132,12 @@ impl Tariff {
     ) -> Prices {
         let left = charge_left(context, meter, state, config) / state.capacity_j;
         let short = (config.battery_floor + self.reserve - left) / self.scale;
-        let full = state.stored_bits as f64 / (state.storage_bits as f64).max(1.0);
-        Prices {
-            joule: 1e-3 * self.kilojoule * libm::exp(short.clamp(-6.0, 6.0)),
-            bit: self.hundredth / (0.01 * (state.storage_bits as f64).max(1.0))
-                * libm::exp((full - 1.0) / self.storage_scale),
-        }
+        let storage = (state.storage_bits as f64).max(1.0);
+        let full = state.stored_bits as f64 / storage;
+        let data = self.hundredth * libm::exp((full - 1.0) / self.storage_scale);
+        // In contact room is made while an image is taken.
+        let room = if state.in_contact { f64::INFINITY } else { storage - state.stored_bits as f64 };
+        Prices { joule: 1e-3 * self.kilojoule * libm::exp(short.clamp(-6.0, 6.0)), bit: data / (0.01 * storage), room }
     }
 }
 

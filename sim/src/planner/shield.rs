@@ -52,8 +52,7 @@ pub fn decide(
         return Ok(decision);
     }
     let Some(shield) = shield else { return planner.decide(context) };
-    let before = if planner.minds_resources() { None } else { shield.before(context) };
-    match before {
+    match shield.before(context, planner.minds_resources()) {
         Some(decision) => Ok(decision),
         None => Ok(shield.check(context, planner.decide(context)?)),
     }
@@ -86,16 +85,17 @@ impl Shield {
         })
     }
 
-    /// What must be done before a planner is asked: momentum out of the wheels, data down while a station hears them.
+    /// What must be done before a planner is asked: momentum out of the wheels, and, where it does not see to that itself,
+    /// data down while a station hears them.
     #[must_use]
-    pub fn before(&self, context: &DecisionContext<'_>) -> Option<Decision> {
+    pub fn before(&self, context: &DecisionContext<'_>, minds_resources: bool) -> Option<Decision> {
         let resources = context.situation.resources?;
         let serve = |duty| Decision::Serve { duty, ticks: self.ticks };
         let momentum = context.situation.body.wheel_speed.amax() * context.model.plant.wheels.inertia;
         if self.thrusters && momentum > self.momentum_limit {
             return Some(self.check(context, serve(Duty::Desaturate)));
         }
-        let sends = self.antenna_needs_task && resources.in_contact && resources.to_send_bits > 0;
+        let sends = !minds_resources && self.antenna_needs_task && resources.in_contact && resources.to_send_bits > 0;
         sends.then(|| self.check(context, serve(Duty::Downlink)))
     }
 

@@ -66,7 +66,7 @@ pub struct LaunchArgs {
     #[arg(long)]
     pub requests: Option<u32>,
     /// Planner instead of the mission's: random, heuristic:SECONDS, lookahead, lookahead:TICKS, beam, beam:WIDTHxDEPTH,
-    /// repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
+    /// frugal, beam+handmade:SHARE, repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
     /// or discrete-ppo, each also with +lookahead, and with :FILE for one that is not shipped.
     #[arg(long)]
     pub planner: Option<PlannerSpec>,

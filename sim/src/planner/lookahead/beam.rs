@@ -166,7 +166,7 @@ impl BeamSearch {
 /// Priority of a candidate, less what its data cost.
 fn worth(search: &Search<'_>, candidate: &Candidate, prices: &Prices) -> f64 {
     let bits = search.meter().map_or(0.0, |meter| meter.bits(candidate.t_acq));
-    candidate.strip.priority - prices.bit * bits
+    if bits > prices.room { 0.0 } else { candidate.strip.priority - prices.bit * bits }
 }
 
 /// Candidates that a sequence could go on with, the most promising first, with the greatest ratio that each could give.

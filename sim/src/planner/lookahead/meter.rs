@@ -10,12 +10,21 @@ use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::sun::Sun;
 
 /// What energy and data are worth.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prices {
     /// Priority per joule.
     pub joule: f64,
     /// Priority per bit.
     pub bit: f64,
+    /// Bits that there is room for: a larger image is worth nothing.
+    pub room: f64,
+}
+
+impl Default for Prices {
+    /// Energy and data cost nothing.
+    fn default() -> Self {
+        Self { joule: 0.0, bit: 0.0, room: f64::INFINITY }
+    }
 }
 
 /// The array's power is looked at once in so many ticks: the satellite turns little meanwhile.
