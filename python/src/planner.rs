@@ -29,7 +29,7 @@ impl Asked {
             if spec.hand_written(0).is_none() {
                 let text = format!(
                     "`{name}` is a trained policy, which this package does not know: expected lookahead[:TICKS], \
-                     beam[:WIDTHxDEPTH], repair[:TICKS] or aspen, each also with -annealing or -squeaky, \
+                     beam[:WIDTHxDEPTH], frugal, beam+handmade:SHARE, repair[:TICKS] or aspen, each also with -annealing or -squeaky, \
                      heuristic:SECONDS, random, or an object that decides"
                 );
                 return Err(PyValueError::new_err(text));

@@ -42,10 +42,11 @@ fn resources_are_the_same_over_dds_in_one_process_and_in_a_re_flight() {
     let planners =
         ["heuristic:80", "random", "lookahead", "beam", "frugal", "beam+handmade:0.35", "repair", "aspen", "hop-ppo"];
     for planner in planners {
-        let (tasks, _, resources) = flown_alike(folder.path(), "bsk", &format!("{MISSION}{BSK}"), "", planner);
+        let (tasks, alarms, resources) = flown_alike(folder.path(), "bsk", &format!("{MISSION}{BSK}"), "", planner);
         for duty in ["charge", "downlink", "desaturate"] {
             assert!(tasks.contains(duty), "{planner} never had to {duty}");
         }
+        assert!(!alarms.contains("planner replaced"), "{planner}: thrusters are taken for a lost wheel: {alarms}");
         assert!(resources["delivered"]["strips"].as_u64() > Some(0), "{planner}: {resources}");
         assert_eq!(resources["delivered"]["floor_violations"], 0, "{planner}: {resources}");
     }

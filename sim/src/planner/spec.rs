@@ -120,7 +120,7 @@ impl FromStr for PlannerSpec {
                 let kind = KINDS.into_iter().find(|kind| *kind == word);
                 let kind = kind.ok_or_else(|| {
                     unknown(
-                        "expected lookahead[:TICKS], beam[:WIDTHxDEPTH], repair[:TICKS] or aspen, each also with -annealing \
+                        "expected lookahead[:TICKS], beam[:WIDTHxDEPTH], frugal, beam+handmade:SHARE, repair[:TICKS] or aspen, each also with -annealing \
                          or -squeaky, heuristic:SECONDS, random, or hop-ppo, hop-ppo-mlp, h-ppo or discrete-ppo, then \
                          +lookahead to fly its proposals in the head, and :FILE for a policy that is not shipped",
                     )

@@ -186,7 +186,10 @@ impl Executive {
         let body = watch.look(sight.now, sight.measured);
         self.guidance.wheel_lost = watch.health().wheel_lost();
         let tick = self.guidance.tick(sight.now, &sight.r_BN_N, &body);
-        watch.commanded(sight.now, tick.torque);
+        match &self.active {
+            Some(Active { task: Task::Serve { duty: Duty::Desaturate, .. }, .. }) => watch.helped(),
+            _ => watch.commanded(sight.now, tick.torque),
+        }
         tick
     }
 }

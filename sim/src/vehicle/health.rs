@@ -160,6 +160,11 @@ impl Watch {
         self.commands = [self.commands[1], Some((tick, torque))];
     }
 
+    /// Others than the wheels take part in turning the satellite: what was commanded says nothing of them.
+    pub fn helped(&mut self) {
+        self.commands = [None; 2];
+    }
+
     /// Takes the state measured at a tick, and gives attitude and rate as they are best known. The same tick again
     /// changes nothing.
     pub fn look(&mut self, tick: Tick, measured: &BodyState) -> BodyState {

@@ -235,6 +235,18 @@ fn the_observation_of_resources_adds_to_that_of_the_dynamics() {
 }
 
 #[test]
+fn thrusters_that_help_are_no_fault_of_the_wheels() {
+    let model = model(Profile::Bsk, |_| {});
+    let mut flown = flight(&model, 4);
+    flown.watch(&model, false);
+    for duty in [Duty::Desaturate, Duty::Charge, Duty::Desaturate] {
+        serve(&mut flown, duty, 240, |_| {});
+    }
+    let changes = flown.take_changes();
+    assert!(changes.iter().all(|(_, health)| health.wheels.min() >= 1.0), "{changes:?}");
+}
+
+#[test]
 fn duties_need_resources() {
     let model = Arc::new(Model::new(SimConfig::default()).unwrap());
     let mut env = episode(&model, 1.0, 1);
