@@ -174,7 +174,7 @@ impl InProcessMission {
             let executive = self.fresh_executive();
             self.mission.without_guidance(back.min(self.mission.horizon()), executive);
         }
-        self.to_report_of_resources();
+        self.look_at_resources();
         if self.mission.over() {
             self.report(None);
             return Ok(None);
@@ -229,7 +229,7 @@ impl InProcessMission {
     }
 
     /// What is to be told of power, data and momentum, as they stand at a decision.
-    fn to_report_of_resources(&mut self) {
+    fn look_at_resources(&mut self) {
         let situation = self.mission.context().situation;
         let (now, state) = (situation.now, situation.resources);
         let told = state.iter().zip(&self.mission.model().config.resources);
