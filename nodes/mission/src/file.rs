@@ -207,7 +207,15 @@ impl Mission {
     pub fn read(path: &Path) -> Result<Self, MissionError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| MissionError::Read { path: path.to_owned(), source })?;
-        let mut mission: Self = toml::from_str(&text)
+        Self::parse(&text, path)
+    }
+
+    /// As [`Self::read`], of a text as it stands in a file.
+    ///
+    /// # Errors
+    /// When it has unknown keys, or a setting is out of range.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, MissionError> {
+        let mut mission: Self = toml::from_str(text)
             .map_err(|source| MissionError::Parse { path: path.to_owned(), source: Box::new(source) })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         mission.planner.resolve(&std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()));

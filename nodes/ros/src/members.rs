@@ -24,6 +24,14 @@ pub(crate) struct Identity {
     pub(crate) epoch: u64,
 }
 
+impl Identity {
+    /// Whether this is a later start of the same node of a mission.
+    pub(crate) fn replaces(&self, other: &Self) -> bool {
+        let mission = |it: &Self| (it.namespace.clone(), it.fleet.clone(), it.node.clone());
+        !self.fleet.is_empty() && mission(self) == mission(other) && self.epoch > other.epoch
+    }
+}
+
 /// How long a process may take to say who it is.
 pub(crate) const INTRODUCTION: Duration = Duration::from_secs(2);
 
@@ -209,6 +217,16 @@ mod tests {
         assert_eq!(members.name_of([8; 12]), Some("planner"));
         members.lose([1; 12], Instant::now() + 2 * MEMORY);
         assert!(!members.heard.contains_key(&[6; 12]));
+    }
+
+    #[test]
+    fn a_later_start_of_the_same_node_of_the_same_mission_replaces_it() {
+        let own = identity("planner", "f", 1);
+        assert!(identity("planner", "f", 2).replaces(&own));
+        for other in [identity("planner", "f", 1), identity("planner", "g", 2), identity("guidance", "f", 2)] {
+            assert!(!other.replaces(&own), "{other:?}");
+        }
+        assert!(!identity("planner", "", 2).replaces(&identity("planner", "", 1)), "there is no mission");
     }
 
     #[test]

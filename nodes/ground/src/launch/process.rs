@@ -8,13 +8,15 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
 use serde::{Deserialize, Serialize};
 
 /// How long a process may take to end after it was asked to.
 const STOP_TIMEOUT: Duration = Duration::from_secs(20);
+/// How long it may take to end once it is killed.
+const KILL_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Names a process for as long as the machine runs: numbers are used again, with another start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -104,13 +106,17 @@ impl Running {
         }
     }
 
-    /// Asks it to end and waits until it has; one that does not end is killed.
+    /// Asks it to end and waits until it has; one that does not end is killed. One that does not end even then is an
+    /// error.
     pub fn stop(&mut self) -> Result<Ending> {
         self.send(Signal::INT)?;
         let deadline = Instant::now() + STOP_TIMEOUT;
         loop {
             if let Some(ending) = self.ended()? {
                 return Ok(ending);
+            }
+            if Instant::now() > deadline + KILL_TIMEOUT {
+                bail!("process {} does not end though it was killed", self.pid());
             }
             if Instant::now() > deadline {
                 self.send(Signal::KILL)?;
