@@ -53,10 +53,11 @@ pub fn faults(bytes: &[u8]) {
     let Ok(plan) = toml::from_str::<FaultPlan>(text) else { return };
     let Ok(period) = TickPeriod::from_frequency(2.0) else { return };
     let horizon = Tick(200_000);
-    let plan = plan.resolved(7, horizon, period);
     if plan.validate(horizon, period).is_err() {
         return;
     }
+    let plan = plan.resolved(7, horizon, period);
+    assert_eq!(plan.validate(horizon, period), Ok(()));
     let scheduled = plan.scheduled(period);
     assert!(scheduled.iter().all(|it| it.from < it.until), "{scheduled:?}");
     let _ = plan.vehicle(period);

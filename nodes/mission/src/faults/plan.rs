@@ -148,11 +148,16 @@ impl FaultPlan {
         self
     }
 
-    /// Checks the faults of a mission against each other and against its length.
+    /// Checks the faults of a mission against each other and against its length, and how many are to be drawn.
     ///
     /// # Errors
     /// The first fault that cannot be flown.
     pub fn validate(&self, horizon: Tick, period: TickPeriod) -> Result<(), FaultPlanError> {
+        // Those that are to be drawn take room and time, too.
+        let count = self.plan.len().saturating_add(self.random as usize);
+        if count > FAULTS_MAX {
+            return Err(FaultPlanError::TooMany { count });
+        }
         check(&self.plan, horizon, period)
     }
 
@@ -325,6 +330,14 @@ mod tests {
 
     fn plan(texts: &[&str]) -> FaultPlan {
         FaultPlan { plan: texts.iter().map(|text| text.parse().unwrap()).collect(), random: 0 }
+    }
+
+    #[test]
+    fn there_may_be_so_many_faults_planned_and_drawn() {
+        let many = |random| FaultPlan { random, ..plan(&["wheel2:dead@600s"]) }.validate(HORIZON, period());
+        assert_eq!(many(999), Ok(()));
+        assert_eq!(many(1000), Err(FaultPlanError::TooMany { count: 1001 }));
+        assert_eq!(many(u32::MAX), Err(FaultPlanError::TooMany { count: 4_294_967_296 }));
     }
 
     #[test]
