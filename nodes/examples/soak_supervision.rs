@@ -45,7 +45,8 @@ fn main() -> Result<()> {
 fn measure(seed: u64) -> Result<(Vec<f64>, Vec<f64>)> {
     let folder = tempfile::tempdir()?;
     let file = folder.path().join("mission.toml");
-    let text = format!("orbits = 10.0\nseed = {seed}\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [1500, 1500]\n");
+    let text =
+        format!("orbits = 10.0\nseed = {seed}\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [1500, 1500]\n");
     std::fs::write(&file, text)?;
     let (mut with, mut without) = (Vec::new(), Vec::new());
     for pair in 0..PAIRS {

@@ -40,7 +40,7 @@ pub fn moves(mission: &Mission) -> Result<Value> {
     };
     let ((), acknowledged) = sortie::fly(launch(&file, &out)?, &out, &environment, pushed)?;
     let nominal = sortie::nominal(&file, &mission.out("nominal"))?;
-    let file = mission.file("lockstep", 12.0, 0.0, "")?;
+    let file = mission.file("lockstep", 8.0, 0.0, "")?;
     let out = mission.out("lockstep");
     let mut flight = launch(&file, &out)?;
     flight.wait_for_tasks(1)?;
@@ -49,7 +49,7 @@ pub fn moves(mission: &Mission) -> Result<Value> {
             break;
         }
         set(&now, clock)?;
-        std::thread::sleep(Duration::from_secs(1));
+        std::thread::sleep(Duration::from_secs(3));
     }
     let (well, _, tasks) = flight.end()?;
     ensure!(well, "the mission in lockstep has failed: {}", flight.said());

@@ -23,7 +23,8 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// Planner or guidance is killed, and panics at once whenever it is started again: safe mode, with a planner that holds,
 /// or the end. How long after the last try the alarm came [s], and the launcher's exit code.
 pub fn fails_again_and_again(seed: u64) -> Result<Value> {
-    let (node, program) = if seed.is_multiple_of(2) { ("planner", "swath-planner") } else { ("guidance", "swath-guidance") };
+    let (node, program) =
+        if seed.is_multiple_of(2) { ("planner", "swath-planner") } else { ("guidance", "swath-guidance") };
     let folder = tempfile::tempdir_in(swath()?.parent().context("swath lies nowhere")?)?;
     for name in PROGRAMS {
         fs::hard_link(swath()?.with_file_name(name), folder.path().join(name))?;
@@ -31,7 +32,8 @@ pub fn fails_again_and_again(seed: u64) -> Result<Value> {
     let tries = folder.path().join("tries");
     make_it_panic(folder.path(), program, &tries)?;
     let file = folder.path().join("mission.toml");
-    let text = "orbits = 3.0\nseed = 7\npace = 100.0\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [1500, 1500]\n";
+    let text =
+        "orbits = 3.0\nseed = 7\npace = 100.0\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [1500, 1500]\n";
     fs::write(&file, text)?;
     let out = folder.path().join("out");
     let mut launch = Command::new(folder.path().join("swath"));
@@ -57,7 +59,9 @@ pub fn fails_again_and_again(seed: u64) -> Result<Value> {
     let code = flight.code()?;
     ensure!(code == Some(4), "exit code {code:?}: {}", flight.said());
     ensure!(after < 1.0, "the alarm came {after} s after the last try");
-    Ok(json!({ "node": node, "tries": count, "given_up_s": given_up, "alarm_after_last_try_s": after, "exit_code": code }))
+    Ok(
+        json!({ "node": node, "tries": count, "given_up_s": given_up, "alarm_after_last_try_s": after, "exit_code": code }),
+    )
 }
 
 /// The program notes each start but the first, and panics then.

@@ -171,7 +171,7 @@ impl Shared {
                     Ok(listener) => hearing.listener = listener,
                     Err(fault) => self.fail(fault),
                 }
-                (health, dropped) = (Health::after(health), Dropped::default());
+                (health, dropped) = (Health::after(health, ailment), Dropped::default());
             }
             self.signal.wait(ASK_EVERY);
         }

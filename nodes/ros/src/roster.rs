@@ -241,8 +241,10 @@ impl Roster {
             Event::RemoteWriterMatched { local_reader, remote_writer } => {
                 state.match_up(local_reader.into(), remote_writer.into());
             }
-            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                state.lose(guid.into());
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => state.lose(guid.into()),
+            Event::ParticipantDiscovered { dpd } => {
+                let member = self.member.then_some(prefix_of(state.own));
+                state.members.find(prefix_of(dpd.guid.into()), member);
             }
             Event::ParticipantLost { id, reason } => {
                 if matches!(reason, LostReason::Timeout { .. }) {
@@ -250,12 +252,8 @@ impl Roster {
                 }
                 state.lose_participant(id.as_ref());
             }
-            Event::RemoteReaderQosIncompatible { remote_reader, .. } => {
-                state.refuse(remote_reader.into(), "a reader");
-            }
-            Event::RemoteWriterQosIncompatible { remote_writer, .. } => {
-                state.refuse(remote_writer.into(), "a writer");
-            }
+            Event::RemoteReaderQosIncompatible { remote_reader, .. } => state.refuse(remote_reader.into(), "a reader"),
+            Event::RemoteWriterQosIncompatible { remote_writer, .. } => state.refuse(remote_writer.into(), "a writer"),
             _ => return,
         }
         drop(state);
@@ -381,6 +379,11 @@ impl Roster {
     /// Fully qualified names of all nodes of the other processes.
     pub(crate) fn nodes(&self) -> BTreeSet<String> {
         lock(&self.state).nodes.values().flatten().map(fully_qualified).collect()
+    }
+
+    /// Whether this node has to begin anew for one that was cut off and is there again.
+    pub(crate) fn take_reunited(&self) -> bool {
+        std::mem::take(&mut lock(&self.state).members.reunited)
     }
 
     /// How often each node of our namespace was started.

@@ -26,6 +26,8 @@ pub struct Fleet {
     /// Simulated time as the nodes know it [ns].
     now_ns: u64,
     keeping: Keeping,
+    /// Whether there was no room to keep who flies.
+    unkept: bool,
 }
 
 /// What has become of a process.
@@ -99,7 +101,7 @@ struct Member {
 impl Fleet {
     /// No processes yet.
     pub fn new(config: &SupervisionConfig, keeping: Keeping) -> Self {
-        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0, keeping }
+        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0, keeping, unkept: false }
     }
 
     /// The processes that a launcher before has left; those that have ended meanwhile are started again.
@@ -120,9 +122,10 @@ impl Fleet {
     }
 
     /// Keeps who flies.
-    fn keep(&self) -> Result<()> {
+    fn keep(&mut self) -> Result<()> {
         let members: Vec<KeptMember> = self.members.iter().map(Member::kept).collect();
-        self.keeping.keep_fleet(&members)
+        self.unkept = !self.keeping.keep_fleet(&members)?;
+        Ok(())
     }
 
     /// Starts a program of this suite: the one beside this executable, or else the one on the PATH. The words end with
@@ -245,7 +248,7 @@ impl Fleet {
             let happened = member.supervise(now, &mut self.now_ns, &self.config, &self.keeping)?;
             events.extend(happened.into_iter().map(|what| Event { node: member.name.clone(), what }));
         }
-        if self.members.iter().map(Member::marks).ne(before) {
+        if self.unkept || self.members.iter().map(Member::marks).ne(before) {
             self.keep()?;
         }
         Ok(events)

@@ -233,7 +233,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     progress.finish();
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
-    output.write_alarms(&flight.board().take_journal())?;
+    output.finish(&flight.board().take_journal())?;
     output.write_ways(&flight.ways())?;
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
