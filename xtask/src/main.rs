@@ -196,12 +196,13 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
         python_tools(root)?;
         return wheel::soak(root);
     }
-    setup(root, true)?;
     if let [name, inputs @ ..] = args
         && name == "fuzz"
     {
+        prerequisites::check()?;
         return fuzz::run(root, inputs);
     }
+    setup(root, true)?;
     soak::run(root, args)
 }
 

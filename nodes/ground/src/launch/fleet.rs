@@ -378,7 +378,10 @@ impl Member {
         // Which of them have ended meanwhile is of no account, but that they are waited for.
         self.abandoned.retain_mut(|old| !matches!(old.ended(), Ok(Some(_))));
         self.hear_out(now, now_ns);
-        self.abandoned.extend(self.running.take());
+        if let Some(mut running) = self.running.take() {
+            running.leave();
+            self.abandoned.push(running);
+        }
         let how = format!("node {} gives no sign of life and does not end though it was killed", self.name);
         self.is_lost(how, now, false)
     }
