@@ -7,6 +7,8 @@ use std::time::Duration;
 
 use anyhow::{Result, ensure};
 use serde_json::{Value, json};
+use swath_msgs::swath_msgs as msg;
+use swath_ros::{Client, Node, RosArgs, graph};
 
 use crate::flight::Flight;
 use crate::{Mission, command, sortie};
@@ -40,15 +42,42 @@ fn fill(disk: &Path, out: &Path) -> Result<([f64; 2], [f64; 2])> {
     let ballast = disk.join("ballast");
     let mut file = fs::File::create(&ballast)?;
     while file.write_all(&[1; 4096]).is_ok() {}
-    let raised = |name: &str| (sortie::events(out, name).len() % 2 == 1).then_some(());
-    let (_, store) = sortie::until("alarm of the store", SOON, || raised("store full"))?;
-    let (_, bag) = sortie::until("alarm of the bag", SOON, || raised("bag full"))?;
+    let board = Board::start()?;
+    let (_, store) = sortie::until("alarm of the store", SOON, || board.stands("store full").then_some(()))?;
+    let (_, bag) = sortie::until("alarm of the bag", SOON, || board.stands("bag full").then_some(()))?;
+    let tasks = || fs::read_to_string(out.join("tasks.jsonl")).map_or(0, |text| text.lines().count());
+    let written = tasks();
     std::thread::sleep(FULL);
-    ensure!(raised("store full").is_some() && raised("bag full").is_some(), "there is no room, and no alarm");
+    ensure!(board.stands("store full") && board.stands("bag full"), "there is no room, and no alarm");
+    ensure!(tasks() <= written + 1, "there is room for tasks: the disk is not full");
     drop(file);
     fs::remove_file(&ballast)?;
-    let gone = |name: &str| raised(name).is_none().then_some(());
-    let (_, store_back) = sortie::until("end of the store's alarm", SOON, || gone("store full"))?;
-    let (_, bag_back) = sortie::until("end of the bag's alarm", SOON, || gone("bag full"))?;
+    let (_, store_back) =
+        sortie::until("end of the store's alarm", SOON, || (!board.stands("store full")).then_some(()))?;
+    let (_, bag_back) = sortie::until("end of the bag's alarm", SOON, || (!board.stands("bag full")).then_some(()))?;
+    sortie::until("tasks that were flown meanwhile", SOON, || (tasks() > written + 3).then_some(()))?;
     Ok(([store, bag], [store_back, bag_back]))
+}
+
+/// The alarms of the mission, as an operator sees them: there is no room for their file.
+struct Board {
+    alarms: Client<msg::ListAlarms>,
+    _node: Node,
+}
+
+impl Board {
+    fn start() -> Result<Self> {
+        let node = Node::start_in(sortie::here()?, "board", &RosArgs::default())?;
+        let alarms = node.client(&graph::LIST_ALARMS)?;
+        node.wait_for_service(&alarms, SOON)?;
+        Ok(Self { alarms, _node: node })
+    }
+
+    /// Whether something is wrong.
+    fn stands(&self, name: &str) -> bool {
+        let answer = self.alarms.call_repeatedly(msg::ListAlarmsRequest::default(), SOON / 40, SOON);
+        let wrong = [msg::Alarm::STATE_UNACKNOWLEDGED, msg::Alarm::STATE_ACKNOWLEDGED];
+        let is = |it: &msg::Alarm| it.name == name && wrong.contains(&it.beneath);
+        answer.is_ok_and(|answer| answer.alarms.iter().any(is))
+    }
 }

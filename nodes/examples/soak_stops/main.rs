@@ -69,8 +69,7 @@ fn main() -> Result<()> {
 fn stop(node: Name, killed: bool) -> Result<Value> {
     let folder = tempfile::tempdir()?;
     let file = folder.path().join("mission.toml");
-    let text =
-        "orbits = 0.9\nseed = 7\npace = 100.0\nplanner = \"lookahead\"\n[requests.random]\ncount = [1500, 1500]\n\
+    let text = "orbits = 0.9\nseed = 7\npace = 100.0\nplanner = \"lookahead\"\n[requests.random]\ncount = [1500, 1500]\n\
          [supervision]\norphaned_s = 10.0\n";
     std::fs::write(&file, text)?;
     let out = folder.path().join("out");
