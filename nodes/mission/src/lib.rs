@@ -12,6 +12,7 @@ pub mod in_process;
 mod keeper;
 pub mod link;
 pub mod orders;
+pub mod origin;
 pub mod outcome;
 pub mod requests;
 pub mod shapes;
