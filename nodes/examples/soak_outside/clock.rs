@@ -22,13 +22,13 @@ pub fn moves(mission: &Mission) -> Result<Value> {
     needs(LIBRARY, "install Debian's libfaketime")?;
     let now = mission.out("now");
     let environment = sortie::here()?;
-    let launch = |file: &Path, out: &Path| {
+    let launch = |file: &Path, out: &Path, words: &[&str]| {
         set(&now, "+0")?;
         let mut swath = Command::new(swath()?);
         swath.env("ROS_DOMAIN_ID", environment.domain.to_string()).env("ROS_LOCALHOST_ONLY", "1");
         swath.env("LD_PRELOAD", LIBRARY).env("FAKETIME_TIMESTAMP_FILE", &now).env("FAKETIME_NO_CACHE", "1");
         swath.env("FAKETIME_DONT_FAKE_MONOTONIC", "1").env("DONT_FAKE_MONOTONIC", "1");
-        Flight::start(swath, file, out, &[])
+        Flight::start(swath, file, out, words)
     };
     let file = mission.file("clock", 0.9, 100.0, "")?;
     let out = mission.out("clock");
@@ -38,16 +38,14 @@ pub fn moves(mission: &Mission) -> Result<Value> {
             flies_on(&out)
         })
     };
-    let ((), acknowledged) = sortie::fly(launch(&file, &out)?, &out, &environment, pushed)?;
+    let ((), acknowledged) = sortie::fly(launch(&file, &out, &[])?, &out, &environment, pushed)?;
     let nominal = sortie::nominal(&file, &mission.out("nominal"))?;
-    let file = mission.file("lockstep", 8.0, 0.0, "")?;
+    let file = mission.file("lockstep", 12.0, 0.0, "")?;
     let out = mission.out("lockstep");
-    let mut flight = launch(&file, &out)?;
+    let mut flight = launch(&file, &out, &["--no-bag"])?;
     flight.wait_for_tasks(1)?;
-    for clock in CLOCKS.iter().cycle() {
-        if !flight.flies()? {
-            break;
-        }
+    for clock in CLOCKS {
+        ensure!(flight.flies()?, "it ended before its clock was moved");
         set(&now, clock)?;
         std::thread::sleep(Duration::from_secs(3));
     }

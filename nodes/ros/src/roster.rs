@@ -104,6 +104,7 @@ impl Roster {
         let mut state = lock(&self.state);
         let former = std::mem::replace(&mut *state, State::new(own, Members::default()));
         state.members = former.members;
+        state.announced = Instant::now().checked_sub(TOGETHER); // It yields to nobody, least to its former self.
         state.readers = former.readers.iter().map(renewed).collect();
         state.writers = former.writers.iter().map(renewed).collect();
         state.table = former.table.iter().map(|(way, gid, entry)| (*way, renewed(gid), *entry)).collect();
@@ -114,7 +115,7 @@ impl Roster {
     /// Lets the other processes know of this node, now and whenever its endpoints change.
     pub(crate) fn announce(&self) {
         let mut state = lock(&self.state);
-        state.announced = Some(Instant::now());
+        state.announced.get_or_insert_with(Instant::now);
         self.publish(&state);
     }
 
@@ -243,8 +244,8 @@ impl Roster {
             }
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => state.lose(guid.into()),
             Event::ParticipantDiscovered { dpd } => {
-                let member = self.member.then_some(prefix_of(state.own));
-                state.members.find(prefix_of(dpd.guid.into()), member);
+                let own = prefix_of(state.own);
+                state.members.find(prefix_of(dpd.guid.into()), self.member.then_some(own));
             }
             Event::ParticipantLost { id, reason } => {
                 if matches!(reason, LostReason::Timeout { .. }) {
