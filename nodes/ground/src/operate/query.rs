@@ -103,8 +103,14 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
     let mut refused = 0;
     let count = calls.len();
     for (name, call) in calls {
+        let known = Some(call.id).filter(|id| *id != 0 && link.is_some());
         let answer = desk.call(call)?;
         refused += usize::from(answer.reason_code != 0);
+        // The way of a strip that is known, as it was and as the ground predicts it.
+        let way = match known {
+            Some(id) => ways(&operator, id - 1, 1)?.remove(&id),
+            None => None,
+        };
         let text = if args.json {
             let opportunities: Vec<_> = answer.opportunities.iter().map(opportunity_json).collect();
             let mut line = json!({
@@ -114,6 +120,9 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
             if let Some(link) = &link {
                 line["over_the_radio"] = Outlook::new(link, &answer.opportunities).json();
             }
+            if let Some(way) = &way {
+                line["way"] = way_json(way);
+            }
             format!("{line}\n")
         } else if answer.reason_code != 0 {
             format!("{name}: {} (reason {})\n", answer.reason, answer.reason_code)
@@ -122,8 +131,12 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
                 args.hours.map_or("until the mission's end".to_owned(), |hours| format!("in the next {hours} h"));
             format!("{name}: no chance {span}\n")
         } else {
-            let radio = link.as_ref().map(|link| Outlook::new(link, &answer.opportunities).text());
-            format!("{name}\n{}{}", opportunity_table(&answer.opportunities), radio.unwrap_or_default())
+            let radio = match (&way, &link) {
+                (Some(way), _) => way_text(way),
+                (None, Some(link)) => Outlook::new(link, &answer.opportunities).text(),
+                (None, None) => String::new(),
+            };
+            format!("{name}\n{}{radio}", opportunity_table(&answer.opportunities))
         };
         if !out::print(&text)? {
             break;

@@ -11,6 +11,8 @@ use swath_node::out;
 use swath_ros::{RosArgs, Shutdown, graph};
 
 use super::client::Operator;
+use super::files::printable;
+use super::link::plan_line;
 use super::show::{status_head, status_line};
 use crate::requests::json::{state_name, status_json, time};
 
@@ -40,6 +42,7 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
     let summaries = operator.node.subscription(&graph::REQUEST_SUMMARY)?;
     let planner = operator.node.subscription(&graph::PLANNER_STATUS)?;
     let radio = operator.node.subscription(&graph::LINK_STATUS)?;
+    let plans = operator.node.subscription(&graph::PREDICTED_PLAN)?;
     let live = std::io::stdout().is_terminal() && !args.json;
     let mut view = View::default();
     let mut seen = 0;
@@ -75,6 +78,14 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
             (view.radio, view.planner) = (Some(status), None);
             news = true;
         }
+        while let Some(plan) = plans.take()? {
+            let line = || format!("{}  plan: {}", time(&plan.header.stamp), printable(&plan_line(&plan)));
+            if !live && !args.json && !out::print_line(line())? {
+                return Ok(());
+            }
+            view.plan = Some(plan);
+            news = true;
+        }
         if live && news {
             out::print(&format!("\x1b[H\x1b[2J{}", view.text()))?;
             // A person reads a few pictures a second.
@@ -107,6 +118,7 @@ fn radio_line(status: &msg::LinkStatus) -> String {
 #[derive(Default)]
 struct View {
     radio: Option<msg::LinkStatus>,
+    plan: Option<msg::PredictedPlan>,
     summary: Option<msg::RequestSummary>,
     planner: Option<msg::PlannerStatus>,
     last: VecDeque<msg::StripStatus>,
@@ -131,6 +143,9 @@ impl View {
         }
         if let Some(it) = &self.radio {
             text += &format!("{}\n", radio_line(it));
+        }
+        if let Some(it) = &self.plan {
+            text += &format!("plan: {}\n", printable(&plan_line(it)));
         }
         if let Some(it) = &self.planner {
             text += &super::planner::status_text(it);
