@@ -117,6 +117,38 @@ fn a_peer_that_doubles_reorders_and_damages_what_is_sent_changes_nothing() {
 }
 
 #[test]
+fn the_ground_says_what_the_satellite_is_going_to_do_and_when_that_will_be_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = format!("[link]\nstations = [{THREE}]\nstrip_bits = 50e6\nprediction_h = 6.0\n");
+    let mission = mission(folder.path(), "foreseen", &link);
+    let (out, domain) = (folder.path().join("out"), common::domain());
+    let words = ["--planner", "lookahead", "--orbits", "12.0", "--seed", "2", "--no-bag"];
+    let mut launch = common::command("swath", &domain);
+    let mut flight = launch.arg("launch").arg(&mission).arg("--out").arg(&out).args(words).spawn().unwrap();
+    let ask = |words: &[&str]| {
+        let output = common::run(&mut common::swath(&domain, words));
+        output.status.success().then(|| serde_json::from_slice::<Value>(&output.stdout).unwrap())
+    };
+    let plan = common::until("a plan", || ask(&["link", "plan", "--json"]));
+    let tasks = plan["tasks"].as_array().unwrap();
+    assert!(tasks.len() > 10, "{plan}");
+    let last = tasks.iter().rfind(|task| task["success"] == true && !task["known_tick"].is_null()).unwrap();
+    let way = ask(&["strips", "show", &last["strip"].to_string(), "--json"]).unwrap()["way"].clone();
+    let step = |name: &str| [&way[name], &way["predicted"][name]].into_iter().find(|it| !it.is_null()).unwrap()["tick"].clone();
+    assert_eq!((&step("imaged"), &step("known")), (&last["end_tick"], &last["known_tick"]), "{way}");
+    assert!(flight.wait().unwrap().success());
+    let flown = lines(&out, "tasks.jsonl");
+    for task in tasks {
+        let flown = &flown[task["task"].as_u64().unwrap() as usize];
+        for name in ["strip", "start_tick", "end_tick"] {
+            assert_eq!(task[name], flown[name], "{task} and {flown}");
+        }
+        assert_eq!(task["success"].as_bool(), Some(flown["reason"].is_null()), "{task} and {flown}");
+    }
+    assert_eq!(plan["partings"], 0);
+}
+
+#[test]
 fn with_a_link_that_never_opens_the_ground_shows_nothing_newer() {
     let folder = tempfile::tempdir().unwrap();
     let mission = mission(folder.path(), "never", "orbits = 20.0\npace = 400.0\n[link]\nstations = [\"svalbard\"]\n");
