@@ -61,12 +61,12 @@ fn a_second_spacecraft_and_a_missing_node_are_told() {
         command.args(["--ros-args", "-p", &parameter, "-p", &format!("peer_timeout_s:={timeout}")]);
         command
     };
-    let mut first = spacecraft("8.0").stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let log = folder.path().join("log");
+    let mut first = common::Running::start(spacecraft("8.0").stderr(std::fs::File::create(&log).unwrap()));
     std::thread::sleep(std::time::Duration::from_secs(2));
     let error = common::fail(&mut spacecraft("8.0"));
     assert!(error.contains("/swath/spacecraft is already running"), "{error}");
-    let mut error = String::new();
-    std::io::Read::read_to_string(&mut first.stderr.take().unwrap(), &mut error).unwrap();
-    assert_eq!(first.wait().unwrap().code(), Some(1));
+    assert_eq!(first.wait().code(), Some(1));
+    let error = std::fs::read_to_string(&log).unwrap();
     assert!(error.contains("node /swath/guidance is not there"), "{error}");
 }

@@ -181,17 +181,17 @@ fn what_operators_did_in_flight_is_flown_again() {
     let domain = common::domain();
     let mut launch = common::command("swath", &domain);
     launch.arg("launch").arg(mission).arg("--out").arg(&out).stdout(Stdio::null());
-    let mut launch = launch.spawn().unwrap();
+    let mut launch = common::Running::start(&mut launch);
     let tasks = out.join("tasks.jsonl");
     while !fs::read_to_string(&tasks).is_ok_and(|lines| lines.lines().count() > 3) {
-        assert!(launch.try_wait().unwrap().is_none(), "the mission ended early");
+        assert!(launch.runs(), "the mission ended early");
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     let requests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/requests");
     let operate = |words: &[&str], numbers: std::ops::Range<u32>| {
         // Some come too late for their strip and are refused: the mission flies on.
         let numbers = numbers.map(|number| number.to_string());
-        common::command("swath", &domain).args(words).args(numbers).output().unwrap();
+        common::run(common::command("swath", &domain).args(words).args(numbers));
     };
     operate(&["strips", "hold"], 100..120);
     operate(&["strips", "release"], 100..110);
@@ -202,7 +202,7 @@ fn what_operators_did_in_flight_is_flown_again() {
         operate(&["strips", "submit", text(&requests.join(file))], 0..0);
     }
     operate(&["strips", "replace", "160", text(&requests.join("replacement.geojson"))], 0..0);
-    assert!(launch.wait().unwrap().success());
+    assert!(launch.wait().success());
     let bag = out.join("bag");
     let (actions, operators) = Recorded::open(&bag, None).unwrap().actions().unwrap();
     let late = actions.iter().filter(|action| !action.initial).count();

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 use swath_ros::graph;
@@ -11,27 +11,23 @@ use swath_ros::graph;
 use crate::common;
 
 /// A bridge at work, ended with the test, and where it is.
-struct Bridge(Child, String);
+struct Bridge {
+    url: String,
+    _process: common::Running,
+}
 
 impl Bridge {
     fn start(domain: &str, words: &[&str]) -> Self {
         let mut command = common::swath(domain, &["bridge", "--listen", "127.0.0.1:0"]);
-        let mut child = command.args(words).stdout(Stdio::piped()).spawn().unwrap();
+        let mut process = common::Running::start(command.args(words).stdout(Stdio::piped()));
         let mut url = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut url).unwrap();
-        Self(child, url.trim().to_owned())
+        BufReader::new(process.stdout()).read_line(&mut url).unwrap();
+        Self { url: url.trim().to_owned(), _process: process }
     }
 
     fn saw(&self, way: &str) -> Value {
-        let mut client: Command = common::python("foxglove.py", &self.1);
+        let mut client: Command = common::python("foxglove.py", &self.url);
         serde_json::from_str(common::succeed(client.arg(way)).trim()).unwrap()
-    }
-}
-
-impl Drop for Bridge {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
     }
 }
 
@@ -100,7 +96,7 @@ fn foxglove_plays_a_bag() {
 fn the_bridge_listens_in_its_namespace_however_that_is_said() {
     for words in [&["--namespace", "/sat2"][..], &["--ros-args", "-r", "__ns:=/sat2"]] {
         let bridge = Bridge::start(&common::domain(), words);
-        assert!(bridge.1.starts_with("ws://127.0.0.1:"), "{}", bridge.1);
+        assert!(bridge.url.starts_with("ws://127.0.0.1:"), "{}", bridge.url);
         let topics = bridge.saw("topics");
         let topics = strings(&topics);
         assert!(topics.contains(&"/sat2/spacecraft/state") && topics.contains(&"/sat2/clock"), "{topics:?}");

@@ -1,8 +1,18 @@
 //! Launching missions in tests.
 
+use std::fs::File;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Output};
 use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal};
+
+/// How long a process may take; one that hangs is told of, and not waited for.
+const LIMIT: Duration = Duration::from_secs(400);
+/// How long one may take that was interrupted.
+const STOP_LIMIT: Duration = Duration::from_secs(90);
 
 /// A DDS domain of this test's own, from 100 to 229, in which nobody is yet: tests run side by side, and so do those of
 /// other checkouts.
@@ -67,8 +77,36 @@ at_deadline = "skip"
 "#;
 
 /// Runs a command to its end.
+///
+/// What it prints goes to files: a process that it leaves behind cannot keep the test waiting.
 pub fn run(command: &mut Command) -> Output {
-    command.output().unwrap()
+    let mut printed = [tempfile::tempfile().unwrap(), tempfile::tempfile().unwrap()];
+    let [stdout, stderr] = [0, 1].map(|number: usize| printed[number].try_clone().unwrap());
+    let mut child = Running::start(command.stdout(stdout).stderr(stderr));
+    let status = child.end();
+    let [stdout, stderr] = printed.each_mut().map(read);
+    let told = || format!("{}\n{}", String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
+    let status = status.unwrap_or_else(|| panic!("{command:?} has not ended within {LIMIT:?}\n{}", told()));
+    Output { status, stdout, stderr }
+}
+
+fn read(file: &mut File) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    file.rewind().unwrap();
+    file.read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+/// Waits until a process has ended; nothing if that takes too long.
+fn end(child: &mut Child, limit: Duration) -> Option<ExitStatus> {
+    let begin = Instant::now();
+    while begin.elapsed() < limit {
+        if let Some(status) = child.try_wait().unwrap() {
+            return Some(status);
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    None
 }
 
 /// Runs a command that must succeed.
@@ -93,15 +131,17 @@ pub fn python(script: &str, domain: &str) -> Command {
     assert!(interpreter.exists(), "no Python at {}: run `cargo xtask setup --test`", interpreter.display());
     let mut command = Command::new(interpreter);
     command.arg(root.join("tests/python").join(script)).arg(domain);
+    // It announces itself more often than every eight seconds: some missions do not take much longer.
     command.env(
         "CYCLONEDDS_URI",
-        "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>",
+        "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>\
+         <Discovery><SPDPInterval>0.5s</SPDPInterval></Discovery>",
     );
     command
 }
 
 /// A process that is ended with the test.
-pub struct Running(std::process::Child);
+pub struct Running(Child);
 
 impl Running {
     /// Starts it.
@@ -109,18 +149,67 @@ impl Running {
         Self(command.spawn().unwrap())
     }
 
+    /// Its process.
+    pub fn pid(&self) -> Pid {
+        Pid::from_raw(self.0.id() as i32).unwrap()
+    }
+
+    /// Whether it is still there.
+    pub fn runs(&mut self) -> bool {
+        self.0.try_wait().unwrap().is_none()
+    }
+
+    /// What it prints, if that goes to a pipe.
+    pub fn stdout(&mut self) -> ChildStdout {
+        self.0.stdout.take().unwrap()
+    }
+
+    /// Waits until it has ended, which it must in time.
+    pub fn wait(&mut self) -> ExitStatus {
+        let id = self.0.id();
+        self.end().unwrap_or_else(|| panic!("process {id} has not ended within {LIMIT:?}"))
+    }
+
+    /// Waits until it has ended; nothing, and it is ended, if that takes too long.
+    fn end(&mut self) -> Option<ExitStatus> {
+        let ended = end(&mut self.0, LIMIT);
+        if ended.is_none() {
+            self.interrupt();
+        }
+        ended
+    }
+
+    /// Sends it a signal.
+    pub fn signal(&self, signal: Signal) {
+        let _ = rustix::process::kill_process(self.pid(), signal);
+    }
+
+    /// Kills it, as `kill -9` does.
+    pub fn kill(&mut self) {
+        self.signal(Signal::KILL);
+        self.wait();
+    }
+
     /// Interrupts it as Ctrl-C does, and waits until it has ended.
     pub fn stop(&mut self) {
-        let pid = rustix::process::Pid::from_raw(self.0.id() as i32).unwrap();
-        let _ = rustix::process::kill_process(pid, rustix::process::Signal::INT);
-        self.0.wait().unwrap();
+        assert!(self.interrupt(), "process {} has not ended within {STOP_LIMIT:?} of SIGINT", self.0.id());
+    }
+
+    /// Interrupts it; whether it has ended in time, if not, it is killed.
+    fn interrupt(&mut self) -> bool {
+        self.signal(Signal::INT);
+        let ended = end(&mut self.0, STOP_LIMIT).is_some();
+        if !ended {
+            let _ = self.0.kill();
+        }
+        ended
     }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
-        if self.0.try_wait().unwrap().is_none() {
-            self.stop();
+        if self.runs() {
+            self.interrupt();
         }
     }
 }
@@ -139,12 +228,12 @@ pub fn json_lines(text: &str) -> Vec<serde_json::Value> {
 
 /// Looks again and again until something is found; tests give up after two minutes.
 pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let begin = std::time::Instant::now();
-    while begin.elapsed() < std::time::Duration::from_secs(120) {
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(120) {
         if let Some(found) = look() {
             return found;
         }
-        std::thread::sleep(std::time::Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(100));
     }
     panic!("{what} did not come within two minutes");
 }

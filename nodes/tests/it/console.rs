@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 use swath_mission::time_text;
@@ -32,22 +32,18 @@ fn states_at(trail: &[Value], time_ms: f64) -> BTreeMap<String, u64> {
 }
 
 /// A recorded mission's console, ended with the test.
-struct Replay(Child, String);
+struct Replay {
+    url: String,
+    _process: common::Running,
+}
 
 impl Replay {
     fn of(bag: &Path, domain: &str) -> Self {
         let mut command = common::swath(domain, &["console", "--listen", &common::address(), "--bag"]);
-        let mut child = command.arg(bag).stdout(Stdio::piped()).spawn().unwrap();
+        let mut process = common::Running::start(command.arg(bag).stdout(Stdio::piped()));
         let mut url = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut url).unwrap();
-        Self(child, url.trim().to_owned())
-    }
-}
-
-impl Drop for Replay {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        BufReader::new(process.stdout()).read_line(&mut url).unwrap();
+        Self { url: url.trim().to_owned(), _process: process }
     }
 }
 
@@ -90,7 +86,7 @@ fn an_operators_day_in_the_console_alone() {
     let begin = time_text::parse("2026-01-01T00:00:00Z").unwrap() as f64 / 1e6;
     let last = trail.iter().filter_map(|line| line["tick"].as_f64()).fold(0.0, f64::max) * 500.0;
     let times: Vec<_> = [0.2, 0.4, 0.6, 0.8, 0.95].map(|share| (begin + share * last).to_string()).into();
-    let replayed = saw(common::python("replayed.py", replay.1.trim_end_matches('/')).args(times));
+    let replayed = saw(common::python("replayed.py", replay.url.trim_end_matches('/')).args(times));
     assert_eq!(replayed["buttons"], 0, "nothing is changed in a recording");
     for pair in replayed["states"].as_array().unwrap() {
         let shown: BTreeMap<String, u64> = serde_json::from_value(pair[1].clone()).unwrap();

@@ -1,7 +1,7 @@
 //! The small programs of `nodes/examples` do what they say.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
 use crate::common;
@@ -30,14 +30,14 @@ fn a_node_of_ones_own_hears_the_planners_tasks() {
     let domain = common::domain();
     let mut node = example("own_node");
     node.args(["--ros-args", "-r", "__ns:=/swath"]).env("ROS_DOMAIN_ID", &domain).env("ROS_LOCALHOST_ONLY", "1");
-    let mut node = node.stdout(Stdio::piped()).spawn().unwrap();
+    let heard = folder.path().join("heard");
+    let mut node = common::Running::start(node.stdout(std::fs::File::create(&heard).unwrap()));
     std::thread::sleep(Duration::from_secs(1));
     let mut launch = common::swath(&domain, &["launch", "--no-bag"]);
     common::succeed(launch.arg(mission).arg("--out").arg(folder.path().join("out")));
-    let process = rustix::process::Pid::from_raw(node.id() as i32).unwrap();
-    rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
-    let said = std::io::read_to_string(node.stdout.take().unwrap()).unwrap();
-    assert!(node.wait().unwrap().success());
+    node.signal(rustix::process::Signal::INT);
+    assert!(node.wait().success());
+    let said = std::fs::read_to_string(&heard).unwrap();
     let tasks = std::fs::read_to_string(folder.path().join("out/tasks.jsonl")).unwrap().lines().count();
     let heard = said.lines().filter(|line| line.starts_with("task ")).count();
     assert!(heard + 3 > tasks && heard > 5, "{heard} of {tasks}: {said}");

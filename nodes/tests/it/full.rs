@@ -108,3 +108,19 @@ fn a_fifth_of_the_messages_costs_little() {
     println!("reward {dropped:.2} with a fifth of the messages lost, {nominal:.2} without");
     assert!(dropped > 0.9 * nominal, "{dropped} of {nominal}");
 }
+
+#[test]
+fn a_mission_ends_although_its_last_messages_are_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in 0..4 {
+        let text = format!(
+            "orbits = 0.1\npace = 200.0\nseed = {seed}\nplanner = \"heuristic:90\"\n[requests.random]\n\
+             count = [100, 100]\n[faults]\nplan = [\"topic:drop 50%@550s+1000s\"]\n"
+        );
+        let mission = common::write_mission(folder.path(), &text);
+        let out = folder.path().join(seed.to_string());
+        common::succeed(launch(&common::domain(), &mission, &out).arg("--no-bag"));
+        let summary: Value = serde_json::from_str(&self::text(&out, "summary.json")).unwrap();
+        assert_eq!(summary["failure"], Value::Null, "{summary}");
+    }
+}

@@ -2,7 +2,6 @@
 //! an outside ROS 2 peer (CycloneDDS).
 
 use std::path::Path;
-use std::process::Child;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -189,10 +188,10 @@ fn the_recorder_has_a_gap(bag: &Path) {
 }
 
 /// A planner alone, which does not start by itself.
-fn planner_that_waits(folder: &Path, domain: &str) -> Child {
+fn planner_that_waits(folder: &Path, domain: &str) -> common::Running {
     let mission = format!("mission:={}", common::write_mission(folder, MISSION).display());
     let mut planner = common::command("swath-planner", domain);
-    planner.args(["--ros-args", "-p", &mission, "-p", "autostart:=false"]).spawn().unwrap()
+    common::Running::start(planner.args(["--ros-args", "-p", &mission, "-p", "autostart:=false"]))
 }
 
 #[test]
@@ -210,7 +209,7 @@ fn a_node_that_does_not_start_by_itself_waits_for_its_manager() {
     let expected = [(&no, &unconfigured), (&yes, &inactive), (&yes, &active), (&yes, &inactive), (&no, &inactive)];
     assert_eq!(steps, expected, "what it knows would be lost without `keep`: {seen}");
     told(&domain, "/swath/planner", &["shutdown"]);
-    assert!(planner.wait().unwrap().success());
+    assert!(planner.wait().success());
 }
 
 #[test]
@@ -236,5 +235,5 @@ fn ros2_lifecycle_manages_a_node() {
     }
     assert_eq!(ros2(&["set", "/swath/planner", "shutdown"]), "Transitioning successful");
     let begin = Instant::now();
-    assert!(planner.wait().unwrap().success() && begin.elapsed() < TIMEOUT);
+    assert!(planner.wait().success() && begin.elapsed() < TIMEOUT);
 }

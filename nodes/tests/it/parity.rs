@@ -147,7 +147,7 @@ fn faults_that_cannot_be_flown_over_dds_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let mission = common::write_mission(folder.path(), "orbits = 0.5\n[faults]\nplan = [\"recorder:hang@120s+5s\"]\n");
     let mut launch = common::command("swath", &common::domain());
-    let output = launch.arg("launch").arg(&mission).arg("--out").arg(folder.path().join("out")).output().unwrap();
+    let output = common::run(launch.arg("launch").arg(&mission).arg("--out").arg(folder.path().join("out")));
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success() && text.contains("recorder:hang@120s+5s cannot be flown over DDS"), "{text}");
 }

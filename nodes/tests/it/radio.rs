@@ -78,7 +78,7 @@ fn whoever_of_the_radio_is_killed_nothing_is_lost_doubled_or_even_different() {
     let words = ["--planner", "lookahead", "--orbits", "12.0", "--seed", "4", "--no-bag"];
     let (alone, killed) = (folder.path().join("alone"), folder.path().join("killed"));
     common::succeed(&mut launch(&mission, &alone, &[&words[..], &["--in-process"]].concat()));
-    let mut flight = launch(&mission, &killed, &words).spawn().unwrap();
+    let mut flight = common::Running::start(&mut launch(&mission, &killed, &words));
     let tasks = || std::fs::read_to_string(killed.join("tasks.jsonl")).unwrap_or_default().lines().count();
     for program in ["swath-link", "swath-catalogue", "swath-requests", "swath-catalogue", "swath-link"] {
         let before = tasks();
@@ -87,7 +87,7 @@ fn whoever_of_the_radio_is_killed_nothing_is_lost_doubled_or_even_different() {
         kill_process(pid, Signal::KILL).unwrap();
         common::until("another one", || process(program, &killed).filter(|&other| other != pid));
     }
-    assert!(flight.wait().unwrap().success());
+    assert!(flight.wait().success());
     assert_eq!(outputs(&killed)[..2], outputs(&alone)[..2]);
     for node in ["link", "catalogue", "request_manager"] {
         let name = format!("{node} lost");

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
-use std::process::{Child, Command};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Signal, kill_process};
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Environment, Node, RosArgs, graph};
 
@@ -69,10 +69,10 @@ fn whoever_comes_first_waits_for_the_others_and_the_mission_is_the_same() {
 }
 
 /// How long a process takes to end after it was asked to; it must say that all is well.
-fn terminate(mut child: Child) -> Duration {
-    kill_process(Pid::from_raw(child.id() as i32).unwrap(), Signal::TERM).unwrap();
+fn terminate(mut child: common::Running) -> Duration {
+    child.signal(Signal::TERM);
     let begin = Instant::now();
-    let status = child.wait().unwrap();
+    let status = child.wait();
     assert!(status.success(), "{status}");
     begin.elapsed()
 }
@@ -87,7 +87,7 @@ fn sigterm_ends_each_node_alone_and_in_flight() {
         let log = folder.path().join(program);
         let mut node = node(program, &common::domain(), &mission);
         node.args(["--log-level", "debug"]);
-        let child = node.stderr(File::create(&log).unwrap()).spawn().unwrap();
+        let child = common::Running::start(node.stderr(File::create(&log).unwrap()));
         common::until(program, || std::fs::read_to_string(&log).unwrap().contains("the node is active").then_some(()));
         let took = terminate(child);
         println!("{program} alone: {:.2} s", took.as_secs_f64());
@@ -101,7 +101,7 @@ fn sigterm_ends_each_node_alone_and_in_flight() {
         let pid = common::until(program, || process(program, &out));
         kill_process(pid, Signal::TERM).unwrap();
         let begin = Instant::now();
-        while process(program, &out) == Some(pid) {
+        while process(program, &out) == Some(pid) && begin.elapsed() < Duration::from_secs(60) {
             std::thread::sleep(Duration::from_millis(5));
         }
         println!("{program} in flight: {:.2} s", begin.elapsed().as_secs_f64());

@@ -132,7 +132,7 @@ fn a_planner_that_is_lost_again_and_again_leads_to_safe_mode_until_an_operator_e
                 count = [3000, 3000]\n[supervision]\nstarts = 1\n";
     let mission = common::write_mission(folder.path(), text);
     let (out, domain) = (folder.path().join("out"), common::domain());
-    let mut flight = launch(&domain, &mission, &out).arg("--no-bag").spawn().unwrap();
+    let mut flight = common::Running::start(launch(&domain, &mission, &out).arg("--no-bag"));
     common::until("the first task", || (!tasks(&out).is_empty()).then_some(()));
     for _ in 0..2 {
         let pid = common::until("the planner", || process("swath-planner", &out));
@@ -151,8 +151,8 @@ fn a_planner_that_is_lost_again_and_again_leads_to_safe_mode_until_an_operator_e
         tasks(&out)[held..].iter().any(|it| it["success"] == true && !holds(it)).then_some(())
     });
     common::until("the end of safe mode", || (events(&out, "safe mode").len() == 2).then_some(()));
-    kill_process(Pid::from_raw(flight.id() as i32).unwrap(), Signal::INT).unwrap();
-    assert_eq!(flight.wait().unwrap().code(), Some(4));
+    flight.signal(Signal::INT);
+    assert_eq!(flight.wait().code(), Some(4));
     assert_eq!(events(&out, "safe mode"), ["raised", "returned"]);
     let journal = journal(&out);
     let safe = journal.iter().find(|it| it["name"] == "safe mode").unwrap();
@@ -165,10 +165,9 @@ fn without_their_launcher_nodes_fly_on_for_a_while_and_end_cleanly() {
     let text = "orbits = 60.0\npace = 200.0\nplanner = \"heuristic:90\"\n[supervision]\norphaned_s = 3.0\n";
     let mission = common::write_mission(folder.path(), text);
     let out = folder.path().join("out");
-    let mut flight = launch(&common::domain(), &mission, &out).spawn().unwrap();
+    let mut flight = common::Running::start(&mut launch(&common::domain(), &mission, &out));
     common::until("the first task", || (!tasks(&out).is_empty()).then_some(()));
-    flight.kill().unwrap();
-    flight.wait().unwrap();
+    flight.kill();
     std::thread::sleep(Duration::from_secs(1));
     assert!(NODES.iter().all(|program| process(program, &out).is_some()), "they fly on");
     common::until("the end of all", || NODES.iter().all(|program| process(program, &out).is_none()).then_some(()));

@@ -24,9 +24,9 @@ fn two_satellites_fly_side_by_side_as_if_each_were_alone() {
         launch.args(words);
         launch
     };
-    let mut first = fly("sat1", "1", &["--namespace", "/sat1"]).spawn().unwrap();
+    let mut first = common::Running::start(&mut fly("sat1", "1", &["--namespace", "/sat1"]));
     succeed(&mut fly("sat2", "2", &["--ros-args", "-r", "__ns:=/sat2"]));
-    assert!(first.wait().unwrap().success());
+    assert!(first.wait().success());
     for (name, seed) in [("sat1", "1"), ("sat2", "2")] {
         let alone = format!("{name}_alone");
         succeed(&mut fly(&alone, seed, &["--in-process"]));

@@ -410,9 +410,14 @@ impl Launcher {
             if self.kept_at.is_none_or(|at| at.elapsed() > KEEP_EVERY) {
                 self.keep()?;
             }
+            // Its time is over, and nobody has said so yet; before that a paced mission goes on by itself.
+            let over = self.stamper.tick_from(&stamp(fleet.now_ns())) >= self.horizon;
+            if self.paced && !over {
+                last_news = Instant::now();
+            }
             // A mission that somebody made wait has not stalled.
             let stands = last_news.max(self.resting.unwrap_or(last_news)).elapsed();
-            if !self.paced && stands > STALL_TIMEOUT {
+            if stands > STALL_TIMEOUT {
                 bail!("no decision for {} s: the mission has stalled", STALL_TIMEOUT.as_secs());
             }
             self.node.wait(WAIT)?;

@@ -77,18 +77,19 @@ fn line(rng: &mut StdRng, mut at: [f64; 2]) -> Value {
 /// A star, maybe with a hole; areas of one feature lie apart.
 fn polygon(rng: &mut StdRng, middle: [f64; 2]) -> Value {
     let radii: Vec<f64> = (0..rng.random_range(3..15)).map(|_| rng.random_range(0.2..0.8)).collect();
-    let ring = |scale: f64, way: f64| {
+    let ring = |scale: f64| {
         let point = |(i, radius): (usize, &f64)| {
-            let (sin, cos) = (way * std::f64::consts::TAU * i as f64 / radii.len() as f64).sin_cos();
-            json!([middle[0] + scale * radius * sin, middle[1] + scale * radius * cos].map(kept))
+            let (sin, cos) = (std::f64::consts::TAU * i as f64 / radii.len() as f64).sin_cos();
+            json!([middle[0] - scale * radius * sin, middle[1] + scale * radius * cos].map(kept))
         };
         let mut ring: Vec<Value> = radii.iter().enumerate().map(point).collect();
         ring.push(ring[0].clone());
         ring
     };
-    let mut rings = vec![ring(1.0, -1.0)];
+    let mut rings = vec![ring(1.0)];
     if rng.random_bool(0.4) {
-        rings.push(ring(0.4, 1.0));
+        // Formats tell holes by their sense; GDAL makes areas of their own of those that leave their area.
+        rings.push(ring(0.4).into_iter().rev().collect());
     }
     json!(rings)
 }

@@ -69,7 +69,9 @@ impl RequestLogic {
         if let Some(id) = self.by_reference(&order.submitter, &order.client_ref).filter(|&id| Some(id) != replaces)
             && let Some(known) = self.request(id).filter(|known| !may_be_asked_again(known.state))
         {
-            return if order.is_for_the_same_as(&known.order) {
+            // What a strip is called is no part of what is asked for: names of strips without one follow their place in a file.
+            let named_so = Order { name: known.order.name.clone(), ..order.clone() };
+            return if named_so.is_for_the_same_as(&known.order) {
                 Ok(id)
             } else {
                 let client_ref = order.client_ref.chars().take(TEXT_MAX).collect();

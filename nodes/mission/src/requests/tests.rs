@@ -97,6 +97,8 @@ fn the_same_request_again_is_the_same_strip_and_another_under_its_name_is_refuse
     let id = submit(&mut logic, equatorial("a", 10.0)).unwrap();
     assert_eq!(submit(&mut logic, equatorial("a", 10.0)), Ok(id));
     assert_eq!(submit(&mut logic, equatorial("a", 20.0)).unwrap_err().code(), 108);
+    let renamed = Order { name: "another name".to_owned(), ..equatorial("a", 10.0) };
+    assert_eq!(submit(&mut logic, renamed), Ok(id));
     let other = Order { submitter: "ops".to_owned(), ..equatorial("a", 20.0) };
     assert_eq!(submit(&mut logic, other), Ok(StripId(2)), "references are each submitter's own");
     assert_eq!((logic.count(State::Accepted), logic.count(State::Rejected)), (2, 1));

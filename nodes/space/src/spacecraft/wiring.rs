@@ -202,6 +202,20 @@ impl SpacecraftNode {
         Ok(())
     }
 
+    /// Time stands. Where messages are dropped by order, the last states are told again and again: nobody else can end the
+    /// mission.
+    fn linger(&mut self) -> Result<()> {
+        let dropped = drops(&self.base);
+        self.base.wait(if dropped { RESEND_SOON_AFTER } else { FLUSH_TIMEOUT })?;
+        while self.commands.take()?.is_some() {}
+        self.take_orders()?;
+        if dropped && self.progress.elapsed() >= RESEND_SOON_AFTER {
+            self.progress = Instant::now();
+            self.resend()?;
+        }
+        Ok(())
+    }
+
     /// As fast as the nodes can go: a tick is integrated when its command has come.
     fn fly_in_lockstep(&mut self) -> Result<()> {
         self.take_commands()?;
@@ -322,11 +336,7 @@ impl LifecycleNode for SpacecraftNode {
             Stage::Waits { since } => return self.wait_for_peers(since),
             Stage::Flies if self.settings.pace > 0.0 => self.fly_paced()?,
             Stage::Flies => self.fly_in_lockstep()?,
-            Stage::Lingers => {
-                self.base.wait(FLUSH_TIMEOUT)?;
-                while self.commands.take()?.is_some() {}
-                self.take_orders()?;
-            }
+            Stage::Lingers => self.linger()?,
         }
         if self.stage == Stage::Flies && self.logic.done() {
             self.arrive()?;
@@ -353,8 +363,12 @@ impl LifecycleNode for SpacecraftNode {
 
 /// In lockstep, after how long without an answer states are sent again.
 fn resend_after(base: &MissionNode) -> Duration {
-    let dropped = !base.mission.faults.drops(base.model.period).is_empty();
-    if dropped { RESEND_SOON_AFTER } else { RESEND_AFTER }
+    if drops(base) { RESEND_SOON_AFTER } else { RESEND_AFTER }
+}
+
+/// Whether messages are dropped by order.
+fn drops(base: &MissionNode) -> bool {
+    !base.mission.faults.drops(base.model.period).is_empty()
 }
 
 /// Between which states there is no guidance, by order.

@@ -93,7 +93,7 @@ impl Place {
 
     /// Runs a command line to its end.
     pub fn run(&self, line: &str) -> Said {
-        let Output { status, stdout, stderr } = self.command(line).output().unwrap();
+        let Output { status, stdout, stderr } = common::run(&mut self.command(line));
         let text = |bytes: Vec<u8>| self.lasting(&String::from_utf8(bytes).unwrap());
         Said { code: status.code(), stdout: text(stdout), stderr: text(stderr) }
     }
