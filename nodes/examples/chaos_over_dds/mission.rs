@@ -30,8 +30,9 @@ pub fn over_dds(seed: u64) -> Result<(String, Vec<PlannedFault>)> {
     let planner = ["lookahead", "heuristic:90", "beam"][(seed / 2 % 3) as usize];
     // A third flies over a radio.
     let link = if seed % 3 == 2 { LINK } else { "" };
-    let head =
-        format!("orbits = {ORBITS}\nseed = {seed}\nplanner = \"{planner}\"\n[requests.random]\ncount = [600, 600]\n{link}");
+    let head = format!(
+        "orbits = {ORBITS}\nseed = {seed}\nplanner = \"{planner}\"\n[requests.random]\ncount = [600, 600]\n{link}"
+    );
     let random = 1 + seed % FAULTS;
     let drawn: Mission = toml::from_str(&format!("{head}[faults]\nrandom = {random}\n"))?;
     let model = drawn.model()?;

@@ -67,7 +67,11 @@ fn mission(seed: u64) -> Result<Mission> {
     let noise = seed.is_multiple_of(3);
     let plant = if noise { "[plant]\nattitude_noise_rad = 2e-4\nrate_noise_rad_s = 6e-5\n" } else { "" };
     // A quarter flies over a radio.
-    let link = if seed % 4 == 3 { "[link]\nmode = \"always\"\nprocessing_s = 2.0\nloss = 0.1\nstrip_bits = 50e6\n" } else { "" };
+    let link = if seed % 4 == 3 {
+        "[link]\nmode = \"always\"\nprocessing_s = 2.0\nloss = 0.1\nstrip_bits = 50e6\n"
+    } else {
+        ""
+    };
     let random = 1 + seed % FAULTS;
     let text = format!(
         "orbits = 0.25\nseed = {seed}\n[requests.random]\ncount = [800, 800]\n{plant}{link}[faults]\nrandom = {random}\n"

@@ -27,7 +27,9 @@ const PLANTS: [(&str, &str); 4] = [
 
 fn main() -> Result<()> {
     let seeds: u64 = std::env::args().nth(1).map_or(Ok(3), |text| text.parse()).context("SEEDS is a number")?;
-    println!("| satellite | loss | tasks | exactly as predicted | strips foretold | partings | median time until | causes |");
+    println!(
+        "| satellite | loss | tasks | exactly as predicted | strips foretold | partings | median time until | causes |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for (name, plant) in PLANTS {
         for loss in [0.0, 0.2] {

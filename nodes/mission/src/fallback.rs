@@ -26,7 +26,9 @@ pub struct Policies {
 impl Policies {
     /// No learned policies: hand-written planners only.
     pub const HAND_WRITTEN: Self = Self {
-        make: |spec, seed| spec.hand_written(seed).with_context(|| format!("{spec} is a policy, which this program lacks")),
+        make: |spec, seed| {
+            spec.hand_written(seed).with_context(|| format!("{spec} is a policy, which this program lacks"))
+        },
         digest: |_| Ok(None),
         other_satellite: |_, _| Ok(None),
         revision: "",

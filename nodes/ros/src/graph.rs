@@ -13,9 +13,10 @@ use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
     AcknowledgeAlarm, AlarmEvent, CancelStrips, CatalogueHeard, Decision, DecisionPoint, FaultOrders, GetLimits,
     GetStrip, GuidanceReached, GuidanceStatus, ImagingTask, LinkStatus, ListAlarms, ListHistory, ListStrips, ListWays,
-    OperatorAction, OrderFault, PlannerStatus, PredictedPlan, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip, RequestSummary,
-    ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms, StripRequest,
-    StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips, WheelTorque,
+    OperatorAction, OrderFault, PlannerStatus, PredictedPlan, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip,
+    RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms,
+    StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips,
+    WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};

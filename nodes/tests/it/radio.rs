@@ -15,6 +15,10 @@ const SEVEN: &str = "\"boulder\", \"merritt\", \"singapore\", \"weilheim\", \"sa
 /// What a mission over the radio leaves that must be the same wherever it is flown.
 const OUTPUTS: [&str; 3] = ["tasks.jsonl", "strips.jsonl", "alarms.jsonl"];
 
+/// A loss, and what of the radio fails by order.
+const FAILING: &str = "0.1\n[faults]\nplan = [\"link:drop 60%@600s+3000s\", \"link:kill@900s\", \"catalogue:kill@1500s\", \
+    \"link:hang@2000s\", \"catalogue:hang@2600s\"]";
+
 fn mission(folder: &Path, name: &str, text: &str) -> PathBuf {
     let path = folder.join(format!("{name}.toml"));
     std::fs::write(&path, format!("{text}[requests.random]\ncount = [800, 800]\n")).unwrap();
@@ -48,6 +52,7 @@ fn missions_over_the_radio_are_the_same_over_dds_in_one_process_and_flown_again(
         ("three", THREE, "3.0", "2", "0.0"),
         ("seven", SEVEN, "2.0", "3", "0.2"),
         ("silent", ONE, "7.0", "1", "0.0\ncommand_loss_h = 1.5"),
+        ("failing", SEVEN, "2.0", "3", FAILING),
     ] {
         let link = format!("[link]\nstations = [{stations}]\nstrip_bits = 50e6\nloss = {loss}\n");
         let mission = mission(folder.path(), name, &link);
@@ -61,6 +66,12 @@ fn missions_over_the_radio_are_the_same_over_dds_in_one_process_and_flown_again(
         }
         let silent = outputs(&out("dds"))[2].contains("ground silent");
         assert_eq!(silent, name == "silent", "{name}");
+        if name == "failing" {
+            for (alarm, times) in [("link lost", 4), ("catalogue lost", 4), ("frames lost", 2)] {
+                let told = lines(&out("dds"), "alarms.jsonl");
+                assert_eq!(told.iter().filter(|it| it["name"] == alarm).count(), times, "{alarm}: {told:?}");
+            }
+        }
         let summary = |kind: &str| -> Value {
             serde_json::from_str(&std::fs::read_to_string(out(kind).join("summary.json")).unwrap()).unwrap()
         };
@@ -134,7 +145,9 @@ fn the_ground_says_what_the_satellite_is_going_to_do_and_when_that_will_be_known
     assert!(tasks.len() > 10, "{plan}");
     let last = tasks.iter().rfind(|task| task["success"] == true && !task["known_tick"].is_null()).unwrap();
     let way = ask(&["strips", "show", &last["strip"].to_string(), "--json"]).unwrap()["way"].clone();
-    let step = |name: &str| [&way[name], &way["predicted"][name]].into_iter().find(|it| !it.is_null()).unwrap()["tick"].clone();
+    let step = |name: &str| {
+        [&way[name], &way["predicted"][name]].into_iter().find(|it| !it.is_null()).unwrap()["tick"].clone()
+    };
     assert_eq!((&step("imaged"), &step("known")), (&last["end_tick"], &last["known_tick"]), "{way}");
     assert!(flight.wait().unwrap().success());
     let flown = lines(&out, "tasks.jsonl");

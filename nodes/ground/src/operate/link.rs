@@ -60,7 +60,8 @@ pub fn run(args: &LinkArgs, ros: &RosArgs) -> Result<()> {
         (LinkCommand::Plan, as_json) => {
             let plans = operator.node.subscription(&graph::PREDICTED_PLAN)?;
             let plan = plans.newest(operator.node.signal(), TIMEOUT)?;
-            let plan = plan.context("the ground predicts nothing: set prediction_h in [link], or wait for the first prediction")?;
+            let plan = plan
+                .context("the ground predicts nothing: set prediction_h in [link], or wait for the first prediction")?;
             match as_json {
                 true => out::print_line(plan_json(&plan))?,
                 false => out::print(&plan_text(&plan))?,

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
 use anyhow::{Context, Result};
+use rustix::process::setpriority_process;
 use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::file::Mission;
@@ -50,6 +51,10 @@ impl Foresight {
         let (told, foreseen) = channel();
         let (mission, ticks) = (mission.clone(), u64::from(period.ticks_ceil(hours * 3600.0)));
         let run = move || {
+            // Nobody waits for it: on Linux this is the priority of this thread alone.
+            if let Err(error) = setpriority_process(None, 19) {
+                tracing::debug!("the mirror's thread has the priority of its process: {error}");
+            }
             let said = Mirror::new(&mission, Box::new(planner)).and_then(|mirror| look(mirror, ticks, &fed, &told));
             if let Err(error) = said {
                 _ = told.send(Err(error));

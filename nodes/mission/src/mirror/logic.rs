@@ -277,7 +277,8 @@ impl Mirror {
             return Ok(false);
         }
         let Some(known) = self.ground.known(&told, &self.nominal.initial(), self.horizon)? else { return Ok(false) };
-        let empty = RequestLogic::new((*self.model).clone(), &self.nominal.initial(), self.horizon, self.nominal.rules());
+        let empty =
+            RequestLogic::new((*self.model).clone(), &self.nominal.initial(), self.horizon, self.nominal.rules());
         let space = Catalogue::new(empty, self.radio.rates().1, self.radio.config(), self.model.period);
         let space = space.known(known, told.at);
         let apart = Apart::new(self.ground.clone(), space, self.radio.clone()).from_tick(self.now);
