@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
 use swath_node::out;
-use swath_ros::{RosArgs, Shutdown, graph};
+use swath_ros::{RosArgs, Shutdown, Subscription, graph};
 
 use super::client::Operator;
 use super::files::printable;
@@ -70,21 +70,9 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
             view.planner = view.radio.is_none().then_some(status);
             news = true;
         }
-        while let Some(status) = radio.take()? {
-            let turned = view.radio.as_ref().is_none_or(|before| before.open != status.open);
-            if !live && !args.json && turned && !out::print_line(radio_line(&status))? {
-                return Ok(());
-            }
-            (view.radio, view.planner) = (Some(status), None);
-            news = true;
-        }
-        while let Some(plan) = plans.take()? {
-            let line = || format!("{}  plan: {}", time(&plan.header.stamp), printable(&plan_line(&plan)));
-            if !live && !args.json && !out::print_line(line())? {
-                return Ok(());
-            }
-            view.plan = Some(plan);
-            news = true;
+        match view.take_radio(&radio, &plans, !live && !args.json)? {
+            Some(told) => news |= told,
+            None => return Ok(()),
         }
         if live && news {
             out::print(&format!("\x1b[H\x1b[2J{}", view.text()))?;
@@ -125,6 +113,32 @@ struct View {
 }
 
 impl View {
+    /// Takes what the ground tells of the radio and of what it predicts; returns whether there was anything, and nothing
+    /// where nobody reads what is printed of it.
+    fn take_radio(
+        &mut self,
+        radio: &Subscription<msg::LinkStatus>,
+        plans: &Subscription<msg::PredictedPlan>,
+        prints: bool,
+    ) -> Result<Option<bool>> {
+        let mut news = false;
+        while let Some(status) = radio.take()? {
+            let turned = self.radio.as_ref().is_none_or(|before| before.open != status.open);
+            if prints && turned && !out::print_line(radio_line(&status))? {
+                return Ok(None);
+            }
+            (self.radio, self.planner, news) = (Some(status), None, true);
+        }
+        while let Some(plan) = plans.take()? {
+            let line = || format!("{}  plan: {}", time(&plan.header.stamp), printable(&plan_line(&plan)));
+            if prints && !out::print_line(line())? {
+                return Ok(None);
+            }
+            (self.plan, news) = (Some(plan), true);
+        }
+        Ok(Some(news))
+    }
+
     fn text(&self) -> String {
         let mut text = String::new();
         if let Some(it) = &self.summary {
