@@ -30,6 +30,7 @@ use crate::orders::import::{RequestsFileError, import};
 use crate::orders::order::Order;
 use crate::orders::rows::Rows;
 use crate::orders::short_lines::ShortLines;
+use crate::origin::Origins;
 use crate::requests::logic::Rules;
 use crate::requests::refusal::ATTEMPTS_MAX;
 use crate::supervision::SupervisionConfig;
@@ -127,6 +128,9 @@ pub struct Mission {
     /// The radio between ground and satellite; without it the ground is always connected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<LinkConfig>,
+    /// Who starts the nodes whose place another program may take.
+    #[serde(skip_serializing_if = "is_default")]
+    pub nodes: Origins,
     /// What the launcher does about nodes that end or hang.
     #[serde(skip_serializing_if = "is_usual")]
     pub supervision: SupervisionConfig,
@@ -194,6 +198,7 @@ impl Default for Mission {
             plant: PlantErrors::default(),
             faults: FaultPlan::default(),
             link: None,
+            nodes: Origins::default(),
             supervision: SupervisionConfig::default(),
         }
     }
@@ -281,6 +286,7 @@ impl Mission {
             if self.link.is_none() {
                 self.faults.fits_no_radio()?;
             }
+            self.nodes.fits(&self.faults)?;
         }
         Ok(())
     }

@@ -13,6 +13,7 @@ mod keeper;
 pub mod link;
 pub mod mirror;
 pub mod orders;
+pub mod origin;
 pub mod outcome;
 pub mod requests;
 pub mod shapes;

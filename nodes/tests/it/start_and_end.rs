@@ -111,3 +111,26 @@ fn sigterm_ends_each_node_alone_and_in_flight() {
     }
     flight.stop();
 }
+
+#[test]
+fn a_planner_that_the_launcher_does_not_start_takes_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "orbits = 0.4\nseed = 5\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [800, 800]\n";
+    let mission = common::write_mission(folder.path(), text);
+    let (out, alone, domain) = (folder.path().join("out"), folder.path().join("alone"), common::domain());
+    let fly = |out: &Path, words: &[&str]| {
+        let mut launch = common::swath(&domain, &["launch", mission.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+        launch.args(words);
+        launch
+    };
+    common::succeed(&mut fly(&alone, &["--in-process"]));
+    let mut flight = common::Running::start(&mut fly(&out, &["--without", "planner"]));
+    common::until("the spacecraft", || process("swath-spacecraft", &out));
+    std::thread::sleep(Duration::from_secs(3));
+    assert!(process("swath-planner", &out).is_none() && tasks(&out).is_empty(), "time waits for it");
+    // Of no fleet: its name speaks for it.
+    let _planner = common::Running::start(&mut node("swath-planner", &domain, &mission));
+    assert!(flight.wait().success());
+    let read = |out: &Path| std::fs::read_to_string(out.join("tasks.jsonl")).unwrap();
+    assert_eq!(read(&out), read(&alone));
+}

@@ -29,6 +29,7 @@ use swath_mission::file::Mission;
 use swath_mission::in_process::InProcessMission;
 use swath_mission::link::config::LinkConfig;
 use swath_mission::orders::order::Order;
+use swath_mission::origin::Origins;
 use swath_mission::outcome::{Summary, SummaryInputs};
 use swath_node::out;
 use swath_node::stamp::Stamper;
@@ -49,7 +50,7 @@ pub struct LaunchArgs {
     /// Take over a mission whose launcher is gone: its output folder. Its nodes fly on, those that have ended are started
     /// again, and it is watched to its end.
     #[arg(long, value_name = "OUT", conflicts_with_all = ["mission", "out", "in_process", "no_bag", "orbits", "requests",
-        "planner", "seed", "pace", "console", "namespace"])]
+        "planner", "seed", "pace", "console", "without", "namespace"])]
     pub attach: Option<PathBuf>,
     /// Folder for bag, tasks and summary; it must be empty or not exist [default: out/NAME-SEED-N].
     #[arg(long)]
@@ -84,6 +85,9 @@ pub struct LaunchArgs {
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080",
         conflicts_with = "in_process")]
     pub console: Option<std::net::SocketAddr>,
+    /// Do not start this node: another program takes its place. Time begins when it is there.
+    #[arg(long, value_name = "NODE", value_parser = Origins::NAMES, conflicts_with = "in_process")]
+    pub without: Vec<String>,
     /// Where it flies.
     #[command(flatten)]
     pub place: Place,
@@ -109,6 +113,9 @@ impl LaunchArgs {
         }
         if let Some(pace) = self.pace {
             mission.pace = pace;
+        }
+        for name in &self.without {
+            mission.nodes.set_external(name);
         }
         mission.validate()?;
         Ok(mission.resolved())
@@ -139,6 +146,9 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
     let mission = args.mission()?;
     if args.in_process {
         mission.faults.fits_one_process()?;
+        if let [external, ..] = mission.nodes.external()[..] {
+            bail!("a mission whose {external} is another program does not fly in one process");
+        }
     } else {
         mission.faults.fits_dds()?;
         if mission.sim.resources.is_some() {
@@ -208,6 +218,7 @@ fn fly(
             console: args.console,
             radio: mission.link.is_some(),
             foresees_policy: learned && mission.link.as_ref().is_some_and(predicts),
+            external: &mission.nodes.external(),
         };
         over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
     }

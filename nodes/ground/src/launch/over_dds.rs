@@ -61,7 +61,7 @@ pub fn fly(
     mission_file: &Path,
     ros: &RosArgs,
     output: &mut OutputFolder,
-    wishes: Wishes,
+    wishes: Wishes<'_>,
     policies: &Policies,
 ) -> Result<Flown> {
     let keeping = Keeping::new(output.make_state_folder()?);
@@ -72,7 +72,7 @@ pub fn fly(
     let mut fleet = Fleet::new(&mission.supervision, keeping);
     if wishes.record {
         let words = [manifest_data, full_bag(&launcher)].concat();
-        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words)?;
+        start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words, &wishes)?;
     }
     if let Some(address) = wishes.console {
         show(&mut fleet, &mission.name, &namespace, address)?;
@@ -236,6 +236,8 @@ pub(super) struct Launcher {
     pub(super) log: TaskLog,
     pub(super) last_summary: Option<msg::RequestSummary>,
     pub(super) paced: bool,
+    /// Whether a node comes from another program, whenever that is.
+    waits_for_others: bool,
     pub(super) stamper: Stamper,
     pub(super) alarms: FlyingBoard,
     /// When a node was last heard to rest because somebody told it to.
@@ -276,7 +278,9 @@ pub(super) struct Reached {
 
 impl Launcher {
     fn start(mission: &Mission, ros: &RosArgs, keeping: Keeping, record: bool) -> Result<Self> {
-        let node = Node::start(graph::LAUNCHER, ros)?;
+        let external: Vec<String> = mission.nodes.external().into_iter().map(str::to_owned).collect();
+        let waits_for_others = !external.is_empty();
+        let node = Node::start(graph::LAUNCHER, &ros.clone().with_parameter("external", Value::Strings(external)))?;
         let model = mission.model()?;
         let stamper = Stamper::new(mission.epoch_unix_s, model.period);
         let planned = of_plan(&mission.faults, model.period);
@@ -295,6 +299,7 @@ impl Launcher {
             log: TaskLog::default(),
             last_summary: None,
             paced: mission.pace > 0.0,
+            waits_for_others,
             alarms: FlyingBoard::new(&node, model.period, stamper.clone(), planned)?,
             resting: None,
             keeping,
@@ -412,7 +417,7 @@ impl Launcher {
             }
             // Its time is over, and nobody has said so yet; before that a paced mission goes on by itself.
             let over = self.stamper.tick_from(&stamp(fleet.now_ns())) >= self.horizon;
-            if self.paced && !over {
+            if (self.paced && !over) || (self.waits_for_others && self.flown.is_none()) {
                 last_news = Instant::now();
             }
             // A mission that somebody made wait has not stalled.

@@ -16,9 +16,12 @@ use swath_mission::file::Mission;
 /// How long the recorder and the console may take to come up.
 const START_TIMEOUT: Duration = Duration::from_secs(20);
 
+/// How long time waits for a program that takes a node's place.
+const EXTERNAL_TIMEOUT_S: f64 = 3600.0;
+
 /// What there is besides the nodes that fly.
 #[derive(Clone, Copy)]
-pub struct Wishes {
+pub struct Wishes<'a> {
     /// Whether a bag is recorded.
     pub record: bool,
     /// Where the console listens, if there is one.
@@ -27,6 +30,18 @@ pub struct Wishes {
     pub radio: bool,
     /// Whether the ground predicts what a learned policy decides.
     pub foresees_policy: bool,
+    /// Nodes whose place another program takes.
+    pub external: &'a [&'static str],
+}
+
+impl Wishes<'_> {
+    /// The words of ROS that name nodes of other programs.
+    fn external(&self) -> Vec<String> {
+        match self.external {
+            [] => Vec::new(),
+            names => vec!["-p".to_owned(), format!("external:=[{}]", names.join(","))],
+        }
+    }
 }
 
 /// Starts the recorder, and waits until it listens.
@@ -36,11 +51,13 @@ pub(super) fn start_recorder(
     bag: &Path,
     namespace: &str,
     further: Vec<String>,
+    wishes: &Wishes<'_>,
 ) -> Result<()> {
     let (manifest, output) = (text(mission_file)?, text(bag)?);
     let words = ["record", "--use-sim-time", "--own-mission-only", "--resume", "--manifest", &manifest];
     let words = words.into_iter().chain(["--output", &output]).map(str::to_owned).chain(further);
-    let words: Vec<String> = words.chain(["--ros-args".to_owned()]).chain(in_namespace(namespace)).collect();
+    let words: Vec<String> =
+        words.chain(["--ros-args".to_owned()]).chain(in_namespace(namespace)).chain(wishes.external()).collect();
     fleet.start(graph::RECORDER, "swath-bag", &words)?;
     fleet.wait_for_line(graph::RECORDER, START_TIMEOUT).map(drop)
 }
@@ -70,13 +87,14 @@ pub(super) fn start_nodes(
     mission_file: &Path,
     namespace: &str,
     output: &OutputFolder,
-    wishes: Wishes,
+    wishes: Wishes<'_>,
 ) -> Result<()> {
     let mission = format!("mission:={}", text(mission_file)?);
     let keep = format!("keep:={}", text(&output.make_state_folder()?)?);
     let words = |extra: &[String]| {
         let own = ["--ros-args", "-p", &mission, "-p", &keep].map(str::to_owned);
-        own.into_iter().chain(in_namespace(namespace)).chain(extra.iter().cloned()).collect::<Vec<_>>()
+        let own = own.into_iter().chain(in_namespace(namespace)).chain(wishes.external());
+        own.chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join(STORE))?);
     // libtorch is large: only who needs it has it.
@@ -88,7 +106,7 @@ pub(super) fn start_nodes(
         peers.extend(graph::RADIO_NODES);
         others.extend([(graph::CATALOGUE, "swath-catalogue"), (graph::LINK, "swath-link")]);
     }
-    for (name, program) in others {
+    for (name, program) in others.into_iter().filter(|(name, _)| !wishes.external.contains(name)) {
         fleet.start(name, program, &words(&[]))?;
     }
     if wishes.record {
@@ -97,8 +115,11 @@ pub(super) fn start_nodes(
     if wishes.console.is_some() {
         peers.push(graph::CONSOLE);
     }
-    let wait_for = ["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
-    fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&wait_for))
+    let mut own = vec!["-p".to_owned(), format!("wait_for:={}", peers.join(","))];
+    if !wishes.external.is_empty() {
+        own.extend(["-p".to_owned(), format!("peer_timeout_s:={EXTERNAL_TIMEOUT_S:?}")]);
+    }
+    fleet.start(graph::SPACECRAFT, "swath-spacecraft", &words(&own))
 }
 
 /// The words after `--ros-args` that put a node into a namespace.

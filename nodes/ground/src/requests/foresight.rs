@@ -11,6 +11,7 @@ use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::file::Mission;
 use swath_mission::link::told::Told;
 use swath_mission::mirror::{Mirror, MirrorError, Prediction, Score};
+use swath_mission::origin::Origin;
 use swath_sim::time::{Tick, TickPeriod};
 
 /// What is going to be, and how far what was predicted before came true.
@@ -42,7 +43,8 @@ impl Foresight {
     /// When the planner cannot be made, or the thread cannot be started.
     pub fn start(mission: &Mission, period: TickPeriod, policies: &Policies) -> Result<Option<Self>> {
         let hours = mission.link.as_ref().map_or(0.0, |link| link.predicts_h(mission.pace));
-        if hours <= 0.0 {
+        // What another program's planner decides, nobody here knows.
+        if hours <= 0.0 || mission.nodes.planner == Origin::External {
             return Ok(None);
         }
         let planner = GuardedPlanner::new((policies.make)(&mission.planner, mission.seed)?);

@@ -228,7 +228,7 @@ impl FaultPlan {
         self.each(|fault| fault.what != What::BagFull, "ordered while a mission flies", can)
     }
 
-    fn each(
+    pub(crate) fn each(
         &self,
         flown: impl Fn(&PlannedFault) -> bool,
         place: &'static str,
