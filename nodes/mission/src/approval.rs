@@ -308,6 +308,10 @@ impl Planner for GatedPlanner {
         self.planner.minds_wheels()
     }
 
+    fn minds_resources(&self) -> bool {
+        self.planner.minds_resources()
+    }
+
     fn rationale(&self) -> Option<Rationale> {
         self.planner.rationale()
     }

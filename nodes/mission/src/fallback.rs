@@ -195,6 +195,10 @@ impl Planner for GuardedPlanner {
         Some(Box::new(self.doubled()?))
     }
 
+    fn minds_resources(&self) -> bool {
+        self.planner.as_ref().is_some_and(|planner| planner.minds_resources())
+    }
+
     fn rationale(&self) -> Option<Rationale> {
         self.planner.as_ref().filter(|_| self.fault.is_none())?.rationale()
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::mission::Mission as Loop;
-use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
+use swath_sim::planner::{Decision, Nobody, Planner, PlannerError};
 use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use crate::absences::{Absences, Presence};
 use crate::alarms::Board;
-use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, report_all};
+use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, of_resources, report_all};
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::keeper::Keeper;
@@ -48,6 +48,8 @@ pub struct InProcessMission {
     board: Board,
     /// What is still to be reported of faults by order.
     to_report: VecDeque<Report>,
+    /// What is still to be reported of power, data and momentum.
+    of_resources: Vec<Report>,
 }
 
 impl InProcessMission {
@@ -91,7 +93,7 @@ impl InProcessMission {
         let to_report = of_plan(&mission.faults, model.period).into();
         let mut mission = Loop::new(model, flight, keeper, horizon);
         mission.set_planning_delay(delay);
-        Ok(Self { mission, requested, faults, board, to_report })
+        Ok(Self { mission, requested, faults, board, to_report, of_resources: Vec::new() })
     }
 
     /// One that goes on at the decision of a task, from what is known of the satellite there.
@@ -201,11 +203,7 @@ impl InProcessMission {
     #[must_use]
     pub fn resources(&self) -> Option<ResourcesSummary> {
         let onboard = self.mission.onboard()?;
-        Some(ResourcesSummary {
-            delivered: *self.mission.delivered(),
-            battery_level: onboard.battery().level(),
-            stored_bits: onboard.storage().stored(),
-        })
+        Some(ResourcesSummary::new(onboard.state()))
     }
 
     /// How long orders took over the radio, in a mission with `[link]`.
@@ -243,6 +241,7 @@ impl InProcessMission {
             let executive = self.fresh_executive();
             self.mission.without_guidance(back.min(self.mission.horizon()), executive);
         }
+        self.to_report_of_resources();
         if self.mission.over() {
             self.report(None);
             return Ok(None);
@@ -296,6 +295,15 @@ impl InProcessMission {
         Executive::watching(self.mission.model(), self.faults.noisy)
     }
 
+    /// What is to be told of power, data and momentum, as they stand at a decision.
+    fn to_report_of_resources(&mut self) {
+        let situation = self.mission.context().situation;
+        let (now, state) = (situation.now, situation.resources);
+        let told = state.iter().zip(&self.mission.model().config.resources);
+        let reports = told.flat_map(|(state, config)| of_resources(now, state, config)).collect::<Vec<_>>();
+        self.of_resources.extend(reports);
+    }
+
     /// Tells the board what happened up to now, and what the planner says of its decision.
     fn report(&mut self, planner: Option<Report>) {
         let now = self.mission.now();
@@ -304,26 +312,12 @@ impl InProcessMission {
         while let Some(report) = self.to_report.pop_front_if(|report| report.tick <= now) {
             reports.push(report);
         }
+        reports.append(&mut self.of_resources);
         reports.extend(planner);
         let space = self.link().map(Apart::space);
         reports.extend(space.map(|space| of_ground(now, space.heard(), space.command_lost(now))));
         report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
-    }
-}
-
-/// Decides in the place of a planner that is away: the attitude is held.
-struct Nobody {
-    ticks: u32,
-}
-
-impl Planner for Nobody {
-    fn name(&self) -> String {
-        "nobody".to_owned()
-    }
-
-    fn decide(&mut self, _: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
-        Ok(Decision::Wait { ticks: self.ticks })
     }
 }
 

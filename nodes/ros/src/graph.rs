@@ -9,14 +9,14 @@ use std::marker::PhantomData;
 use swath_msgs::diagnostic_msgs::DiagnosticArray;
 use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
-use swath_msgs::sensor_msgs::{JointState, NavSatFix};
+use swath_msgs::sensor_msgs::{BatteryState, JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
     AcknowledgeAlarm, AlarmEvent, CancelStrips, CatalogueHeard, Decision, DecisionPoint, FaultOrders, GetLimits,
     GetStrip, GuidanceReached, GuidanceStatus, ImagingTask, LinkStatus, ListAlarms, ListHistory, ListStrips, ListWays,
     OperatorAction, OrderFault, PlannerStatus, PredictedPlan, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip,
-    RequestSummary, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms,
-    StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips,
-    WheelTorque,
+    RequestSummary, ResourceState, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState,
+    StandingAlarms, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm,
+    UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -231,6 +231,10 @@ pub const SUB_SATELLITE_POINT: Topic<NavSatFix> =
     Topic::new("spacecraft/sub_satellite_point", Profile::Event, &[SPACECRAFT], &[]);
 /// Speeds and torques of the wheels, decimated.
 pub const WHEELS: Topic<JointState> = Topic::new("spacecraft/wheels", Profile::Event, &[SPACECRAFT], &[]);
+/// Charge of the battery, decimated, in missions with `[resources]`.
+pub const BATTERY: Topic<BatteryState> = Topic::new("spacecraft/battery", Profile::Event, &[SPACECRAFT], &[]);
+/// Power, storage and momentum, decimated, in missions with `[resources]`.
+pub const RESOURCES: Topic<ResourceState> = Topic::new("spacecraft/resources", Profile::Event, &[SPACECRAFT], &[]);
 /// Frames, decimated.
 pub const TF: Topic<TFMessage> = Topic::new("/tf", Profile::Event, &[SPACECRAFT], &[]);
 /// Health of the nodes.
@@ -287,6 +291,8 @@ pub const TOPICS: &[Entry] = &[
     SPACECRAFT_TRUTH.entry,
     SUB_SATELLITE_POINT.entry,
     WHEELS.entry,
+    BATTERY.entry,
+    RESOURCES.entry,
     TF.entry,
     WHEEL_TORQUE.entry,
     DECISION_POINT.entry,

@@ -142,6 +142,11 @@ pub trait Planner {
         false
     }
 
+    /// Whether it sees to data by itself, so that the shield sees to battery and momentum alone.
+    fn minds_resources(&self) -> bool {
+        false
+    }
+
     /// Why it decided as it last did; nothing from a planner that does not weigh candidates.
     fn rationale(&self) -> Option<Rationale> {
         None

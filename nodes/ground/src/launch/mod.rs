@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context as _, Error, Result, bail};
+use anyhow::{Context as _, Error, Result};
 use clap::Args;
 use swath_sim::planner::{Planner, PlannerSpec};
 use swath_sim::requests::scenario::ScenarioConfig;
@@ -68,7 +68,7 @@ pub struct LaunchArgs {
     #[arg(long)]
     pub requests: Option<u32>,
     /// Planner instead of the mission's: random, heuristic:SECONDS, lookahead, lookahead:TICKS, beam, beam:WIDTHxDEPTH,
-    /// repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
+    /// frugal, beam+handmade:SHARE, repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
     /// or discrete-ppo, each also with +lookahead, and with :FILE for one that is not shipped.
     #[arg(long)]
     pub planner: Option<PlannerSpec>,
@@ -151,9 +151,6 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         }
     } else {
         mission.faults.fits_dds()?;
-        if mission.sim.resources.is_some() {
-            bail!("a mission with [resources] flies in one process only: add --in-process");
-        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");

@@ -1,8 +1,10 @@
 //! What nodes report of conditions that follow from the mission itself, so that each flight of it reports the same.
 
 use serde::{Deserialize, Serialize};
+use swath_sim::config::resources::ResourcesConfig;
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::health::Health;
+use swath_sim::vehicle::resources::{Failure as Failed, ResourceState};
 
 use super::board::{Board, Key};
 use super::definitions::Severity;
@@ -85,6 +87,35 @@ pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
     let text = if health.tracker_out { "the gyro carries the attitude on" } else { "it has an attitude" };
     reports.push(Report::new(tick, GUIDANCE, "star tracker out", health.tracker_out, text.to_owned()));
     reports
+}
+
+/// Charge above the floor, over the capacity, at which the battery counts as low.
+const LOW: f64 = 0.05;
+/// Share of the storage at which it counts as full.
+const FULL: f64 = 0.95;
+/// Share of its limit at which a wheel's momentum counts as high.
+const HIGH: f64 = 0.8;
+
+/// What guidance reports of power, data and momentum at a decision.
+#[must_use]
+pub fn of_resources(tick: Tick, state: &ResourceState, config: &ResourcesConfig) -> Vec<Report> {
+    let report = |name, wrong, text| Report::new(tick, GUIDANCE, name, wrong, text);
+    let percent = |share: f64| share * 100.0;
+    let (level, floor) = (state.level(), config.battery_floor);
+    let stored = state.stored_bits as f64 / (state.storage_bits as f64).max(1.0);
+    let (momentum, limit) = (state.momentum_nms, config.wheel_momentum_max_nms);
+    let failed = match state.safe_mode {
+        None => "it goes on",
+        Some(Failed::BatteryEmpty) => "the battery was empty: the satellite charges until it is above its floor",
+        Some(Failed::WheelMomentum) => "a wheel was over its limit: the satellite only sees to that",
+    };
+    let charge = format!("{:.1} % of its capacity, the floor is {:.1} %", percent(level), percent(floor));
+    vec![
+        report("battery low", level < floor + LOW, charge),
+        report("storage full", stored > FULL, format!("{:.1} % is taken", percent(stored))),
+        report("momentum high", momentum > HIGH * limit, format!("{momentum:.2} N m s of {limit} N m s")),
+        report("power or wheels failed", state.safe_mode.is_some(), failed.to_owned()),
+    ]
 }
 
 /// What the planner reports of a decision: why another one, `name`, made it in its place.
