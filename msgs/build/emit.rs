@@ -26,7 +26,21 @@ pub fn source(catalogue: &Catalogue, services: &[Service]) -> Result<String, Str
         let _ = writeln!(out, "crate::Interface::of::<{path}>(),");
     }
     out.push_str("];\n");
+    emit_every_type(&mut out, catalogue);
     Ok(out)
+}
+
+/// A macro with the names of all types, for what is done with each of them.
+fn emit_every_type(out: &mut String, catalogue: &Catalogue) {
+    out.push_str(
+        "/// `every_type!(it)` is `it!(A, B, …)` with the path of every message, and of what services send and answer.
+        #[macro_export]
+        macro_rules! every_type { ($then:ident) => { $then!(",
+    );
+    for message in catalogue.values() {
+        let _ = writeln!(out, "${},", rust_path(&message.package, &message.name));
+    }
+    out.push_str("); } }\n");
 }
 
 fn emit_message(out: &mut String, catalogue: &Catalogue, message: &Message) -> Result<(), String> {

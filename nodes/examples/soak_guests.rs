@@ -10,6 +10,7 @@
 #[path = "common/company.rs"]
 mod company;
 #[path = "common/flight.rs"]
+#[allow(dead_code, reason = "others use more of it")]
 mod flight;
 #[path = "common/soak.rs"]
 mod soak;

@@ -40,9 +40,15 @@ pub struct Mission<K> {
 impl<K: RequestKeeper> Mission<K> {
     /// A mission that begins where a flight stands and ends at `horizon`.
     #[must_use]
-    pub fn new(model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
+    pub fn new(model: Arc<Model>, flight: Flight, keeper: K, horizon: Tick) -> Self {
+        Self::from_task(0, model, flight, keeper, horizon)
+    }
+
+    /// The same from the decision of a task's number on.
+    #[must_use]
+    pub fn from_task(task: u64, model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
         let situation = flight.situation();
-        let (task, previous, candidates) = (0, None, Vec::new());
+        let (previous, candidates) = (None, Vec::new());
         let shield = Shield::new(&model);
         let mut mission =
             Self { model, flight, keeper, horizon, task, situation, previous, candidates, planning_delay: 0, shield };

@@ -3,6 +3,7 @@
 mod ament;
 mod bench;
 mod examples;
+mod fuzz;
 mod libtorch;
 mod lint;
 mod prerequisites;
@@ -48,6 +49,7 @@ usage: cargo xtask COMMAND
   ament [FOLDER]   build the programs and lay them out as the ROS 2 package `swath`
                    in FOLDER (target/ament), for `ros2 run` and `ros2 launch`
   soak python      run the Python package's long examples; they fetch gigabytes
+  soak fuzz [N]    fuzz what comes from outside, each target with N inputs (10 million)
 ";
 
 fn main() -> ExitCode {
@@ -193,6 +195,12 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
     if args == ["python"] {
         python_tools(root)?;
         return wheel::soak(root);
+    }
+    if let [name, inputs @ ..] = args
+        && name == "fuzz"
+    {
+        prerequisites::check()?;
+        return fuzz::run(root, inputs);
     }
     setup(root, true)?;
     soak::run(root, args)

@@ -50,9 +50,10 @@ pub fn run(root: &Path, args: &[OsString]) -> Result<()> {
     })
 }
 
-fn number(text: &OsString) -> Result<u64> {
+/// Reads a number of seeds or of inputs, with `_` where it helps to read.
+pub fn number(text: &OsString) -> Result<u64> {
     let number = text.to_str().and_then(|it| it.replace('_', "").parse().ok());
-    number.filter(|it| *it > 0).with_context(|| format!("{} is no number of seeds", text.display()))
+    number.filter(|it| *it > 0).with_context(|| format!("{} is no number above 0", text.display()))
 }
 
 /// Does the pieces that are not in the file yet, and prints the whole.

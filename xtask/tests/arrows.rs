@@ -42,6 +42,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "swath-training",
         ],
     ),
+    ("swath-fuzz", &["swath-sim", "swath-msgs", "swath-ros", "swath-mission", "swath-ground"]),
     ("xtask", &[]),
 ];
 

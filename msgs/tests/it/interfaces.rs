@@ -62,7 +62,8 @@ fn type_hashes_are_those_of_ros_2() {
         ("swath_msgs/msg/CatalogueHeard", "c65b2c6553479c4c9a2f76cbf73a55ca122911fb83e26deeac5d0a3bb20b78d2"),
         ("swath_msgs/msg/GuidanceReached", "c8d07605150eb9370beaeb5485879bf9a913b7efc0ec53d0a23883df4ab10dd9"),
         ("swath_msgs/msg/LinkStatus", "13dd719b2832603116f9dfc6e4be46de48c1f6400cbfc463ca43c241425356d4"),
-        ("swath_msgs/msg/StripWay", "f9e517e537390d35fc1d46ad9a4b77c3541255f0d3f0de65e29a4c80f03202f8"),
+        ("swath_msgs/msg/PredictedPlan", "3b075fa6869b637ea775570c6668f3ab299e41f23344635d0ce430be40abbf20"),
+        ("swath_msgs/msg/StripWay", "e94987f3a20918abc68b5e7e48ce9d9386199e617680be417775d2873d335b08"),
     ] {
         assert_eq!(type_hash_for(type_name), Some(format!("RIHS01_{hash}").as_str()), "{type_name}");
     }

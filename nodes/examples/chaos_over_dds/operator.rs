@@ -36,7 +36,11 @@ pub struct Operator {
 impl Operator {
     /// Comes up in a domain.
     pub fn start(domain: u16) -> Result<Self> {
-        let environment = Environment { domain, localhost_only: true, ..Environment::read()? };
+        Self::start_in(Environment { domain, localhost_only: true, ..Environment::read()? })
+    }
+
+    /// Comes up in an environment.
+    pub fn start_in(environment: Environment) -> Result<Self> {
         let node = Node::start_in(environment, "chaos_operator", &RosArgs::default())?;
         let client = node.client(&graph::SUBMIT_STRIPS)?;
         Ok(Self { client, next: 0, acknowledged: BTreeMap::new(), _node: node })

@@ -34,8 +34,13 @@ impl Flight {
     /// Launches a mission with some words in a domain.
     pub fn launch(mission: &Path, out: &Path, domain: u16, words: &[&str]) -> Result<Self> {
         let mut command = Command::new(swath()?);
-        command.arg("launch").arg(mission).arg("--out").arg(out).args(words);
         command.env("ROS_DOMAIN_ID", domain.to_string()).env("ROS_LOCALHOST_ONLY", "1");
+        Self::start(command, mission, out, words)
+    }
+
+    /// As [`Self::launch`], by a command that becomes `swath` in surroundings of its own.
+    pub fn start(mut command: Command, mission: &Path, out: &Path, words: &[&str]) -> Result<Self> {
+        command.arg("launch").arg(mission).arg("--out").arg(out).args(words);
         let said = std::fs::File::create(out.with_extension("log"))?;
         let launch = command.stdout(Stdio::null()).stderr(said).spawn()?;
         Ok(Self { launch, out: out.to_owned() })
@@ -54,6 +59,16 @@ impl Flight {
     /// Whether it has not ended.
     pub fn flies(&mut self) -> Result<bool> {
         Ok(self.launch.try_wait()?.is_none())
+    }
+
+    /// The launcher's process.
+    pub fn pid(&self) -> u32 {
+        self.launch.id()
+    }
+
+    /// Waits for the end; the launcher's exit code.
+    pub fn code(&mut self) -> Result<Option<i32>> {
+        Ok(self.launch.wait()?.code())
     }
 
     /// `tasks.jsonl` as far as it is written.

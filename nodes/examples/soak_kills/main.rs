@@ -16,22 +16,21 @@ mod operator;
 mod request;
 #[path = "../common/soak.rs"]
 mod soak;
+#[path = "../common/sortie.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod sortie;
 mod witness;
 
-use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use rand::rngs::StdRng;
 use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::{Value, json};
 
-use crate::flight::{Flight, signal, swath};
-use crate::operator::Operator;
+use crate::flight::{Flight, signal};
 use crate::witness::{NODES, Witness};
 
 /// Missions of a whole figure.
@@ -98,32 +97,14 @@ fn mission(seed: u64) -> Result<Flown> {
     );
     std::fs::write(&file, text)?;
     let out = folder.path().join("out");
-    let domain = own_domain();
-    let mut flight = Flight::launch(&file, &out, domain, &[])?;
+    let environment = sortie::here()?;
+    let mut flight = Flight::launch(&file, &out, environment.domain, &[])?;
     flight.wait_for_tasks(1)?;
-    let witness = Witness::start(domain, &out)?;
-    let over = AtomicBool::new(false);
-    let (recovery_s, acknowledged) = std::thread::scope(|scope| -> Result<_> {
-        let submitter = scope.spawn(|| submit_until(&over, domain));
-        let killed = strike_each(seed, stops, &witness, &out);
-        let ended = wait_for_end(&mut flight);
-        over.store(true, Ordering::Relaxed);
-        let acknowledged = submitter.join().unwrap_or_else(|_| anyhow::bail!("the operator has failed"));
-        ended?;
-        Ok((killed?, acknowledged?))
-    })
-    .with_context(|| flight.said())?;
-    let (_, summary, _) = flight.end()?;
-    ensure!(summary.failure.is_none(), "it has failed: {:?}: {}", summary.failure, flight.said());
-    look::check(&out, &acknowledged)?;
-    let nominal = nominal(&file, &folder.path().join("nominal"))?;
-    let reward = look::lines(&out.join("tasks.jsonl"))?.iter().filter_map(|it| it["reward"].as_f64()).sum();
-    Ok(Flown { stops, recovery_s, acknowledged: acknowledged.len(), reward, reward_nominal: nominal })
-}
-
-fn own_domain() -> u16 {
-    let own = std::env::var("ROS_DOMAIN_ID").ok().and_then(|it| it.parse().ok());
-    own.unwrap_or(100 + (std::process::id() % 130) as u16)
+    let witness = Witness::start(environment.domain, &out)?;
+    let strike = || strike_each(seed, stops, &witness, &out);
+    let (recovery_s, acknowledged) = sortie::fly(flight, &out, &environment, strike)?;
+    let reward_nominal = sortie::nominal(&file, &folder.path().join("nominal"))?;
+    Ok(Flown { stops, recovery_s, acknowledged, reward: sortie::reward(&out)?, reward_nominal })
 }
 
 /// Kills or stops each node once, in random order and at random moments; how long it took until its work was done again
@@ -147,29 +128,4 @@ fn strike_each(seed: u64, stops: bool, witness: &Witness, out: &Path) -> Result<
         }
     }
     Ok(recovery_s)
-}
-
-fn wait_for_end(flight: &mut Flight) -> Result<()> {
-    let began = Instant::now();
-    while flight.flies()? {
-        ensure!(began.elapsed() < Duration::from_secs(200), "it does not end by itself: {}", flight.said());
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    Ok(())
-}
-
-fn submit_until(over: &AtomicBool, domain: u16) -> Result<BTreeMap<String, u64>> {
-    let mut operator = Operator::start(domain)?;
-    while !over.load(Ordering::Relaxed) {
-        operator.turn()?;
-    }
-    Ok(operator.acknowledged)
-}
-
-/// What the mission earns where nothing fails.
-fn nominal(file: &Path, out: &Path) -> Result<f64> {
-    let mut launch = Command::new(swath()?);
-    let flown = launch.arg("launch").arg(file).arg("--in-process").arg("--out").arg(out).output()?;
-    ensure!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stderr));
-    Ok(look::lines(&out.join("tasks.jsonl"))?.iter().filter_map(|it| it["reward"].as_f64()).sum())
 }

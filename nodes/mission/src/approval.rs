@@ -315,6 +315,10 @@ impl Planner for GatedPlanner {
     fn rationale(&self) -> Option<Rationale> {
         self.planner.rationale()
     }
+
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(Self { gate: self.gate.clone(), planner: self.planner.doubled()? }))
+    }
 }
 
 fn same(a: &Candidate, b: &Candidate) -> bool {

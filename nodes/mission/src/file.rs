@@ -212,7 +212,15 @@ impl Mission {
     pub fn read(path: &Path) -> Result<Self, MissionError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| MissionError::Read { path: path.to_owned(), source })?;
-        let mut mission: Self = toml::from_str(&text)
+        Self::parse(&text, path)
+    }
+
+    /// As [`Self::read`], of a text as it stands in a file.
+    ///
+    /// # Errors
+    /// When it has unknown keys, or a setting is out of range.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, MissionError> {
+        let mut mission: Self = toml::from_str(text)
             .map_err(|source| MissionError::Parse { path: path.to_owned(), source: Box::new(source) })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         mission.planner.resolve(&std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()));
@@ -283,6 +291,9 @@ impl Mission {
         if !self.faults.is_empty() {
             let model = self.model()?;
             self.faults.validate(self.horizon(&model), model.period)?;
+            if self.link.is_none() {
+                self.faults.fits_no_radio()?;
+            }
             self.nodes.fits(&self.faults)?;
         }
         Ok(())
@@ -294,7 +305,7 @@ impl Mission {
         self.initial = Some(self.initial());
         if let Ok(model) = self.model() {
             let horizon = self.horizon(&model);
-            self.faults = self.faults.resolved(self.seed, horizon, model.period);
+            self.faults = self.faults.resolved(self.seed, self.link.is_some(), horizon, model.period);
         }
         self
     }

@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::mission::Mission as Loop;
-use swath_sim::planner::{Decision, Nobody, Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Nobody, Planner, PlannerError};
 use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
-use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::flight::{Flight, Situation};
 use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
@@ -21,6 +21,7 @@ use crate::keeper::Keeper;
 use crate::link::apart::Apart;
 use crate::link::ground::WayLine;
 use crate::link::response::LinkSummary;
+use crate::link::told::Told;
 use crate::orders::action::Action;
 use crate::outcome::{ResourcesSummary, TaskLine};
 use crate::requests::journal::InFlight;
@@ -39,6 +40,7 @@ pub enum InProcessError {
 }
 
 /// A mission ready to be flown in this process: the loop of the simulation around the request manager of the nodes.
+#[derive(Clone)]
 pub struct InProcessMission {
     mission: Loop<Keeper>,
     requested: usize,
@@ -64,6 +66,18 @@ impl InProcessMission {
     /// # Errors
     /// When a setting is out of range or a file of requests cannot be used.
     pub fn with_actions(mission: &Mission, actions: Vec<Action>) -> Result<Self, InProcessError> {
+        let mut flight = Self::watched(mission, actions)?;
+        if let Keeper::Apart(apart) = flight.mission.keeper_mut() {
+            apart.forget_told();
+        }
+        Ok(flight)
+    }
+
+    /// The same, of which [`Self::take_told`] tells what the ground was told, in a mission with `[link]`.
+    ///
+    /// # Errors
+    /// When a setting is out of range or a file of requests cannot be used.
+    pub fn watched(mission: &Mission, actions: Vec<Action>) -> Result<Self, InProcessError> {
         mission.faults.fits_one_process().map_err(MissionError::from)?;
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
@@ -80,6 +94,59 @@ impl InProcessMission {
         let mut mission = Loop::new(model, flight, keeper, horizon);
         mission.set_planning_delay(delay);
         Ok(Self { mission, requested, faults, board, to_report, of_resources: Vec::new() })
+    }
+
+    /// One that goes on at the decision of a task, from what is known of the satellite there.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub(crate) fn resumed(
+        mission: &Mission,
+        task: u64,
+        situation: &Situation,
+        apart: Apart,
+    ) -> Result<Self, InProcessError> {
+        let mut fresh = Self::new(mission)?;
+        let (model, horizon) = (Arc::clone(fresh.model()), fresh.horizon());
+        let mut flight = fresh.mission.flight().clone();
+        flight.resume(&model, situation);
+        let delay = fresh.mission.planning_delay();
+        fresh.mission = Loop::from_task(task, model, flight, Keeper::Apart(Box::new(apart)), horizon);
+        fresh.mission.set_planning_delay(delay);
+        Ok(fresh)
+    }
+
+    /// Something will be asked of the ground, after all that is still to come, in a mission with `[link]`.
+    pub(crate) fn will_be_asked(&mut self, action: Action) {
+        if let Keeper::Apart(apart) = self.mission.keeper_mut() {
+            apart.will_also_be_asked(action);
+        }
+    }
+
+    /// What the ground was told since the last call, where that is watched.
+    pub fn take_told(&mut self) -> Vec<Told> {
+        match self.mission.keeper_mut() {
+            Keeper::Together(_) => Vec::new(),
+            Keeper::Apart(apart) => apart.take_told(),
+        }
+    }
+
+    /// What the next decision rests on.
+    #[must_use]
+    pub fn context(&self) -> DecisionContext<'_> {
+        self.mission.context()
+    }
+
+    /// Tick at which the mission ends.
+    #[must_use]
+    pub fn horizon(&self) -> Tick {
+        self.mission.horizon()
+    }
+
+    /// Simulated time.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.mission.now()
     }
 
     /// The alarms.

@@ -44,6 +44,9 @@ impl Default for SupervisionConfig {
     }
 }
 
+/// How long a process may take to end once it is killed [s]: one that waits for a disk that does not answer does not.
+const DIES_S: f64 = 1.0;
+
 /// What is to be done about a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -53,6 +56,8 @@ pub enum Step {
     Warn,
     /// It hangs: kill it.
     Kill,
+    /// It was killed and does not end: leave it alone, another one takes its place.
+    Abandon,
     /// Start it again.
     Start,
     /// It was lost too often: leave it.
@@ -75,8 +80,8 @@ pub enum Heard {
 enum Stage {
     /// It was started, or gave its last sign of life, then; whether it was warned of since.
     Runs { sign: Duration, fresh: bool, warned: bool },
-    /// It was killed and has not ended yet.
-    Dies,
+    /// It was killed then and has not ended yet.
+    Dies { since: Duration },
     /// It is started again then.
     Waits { until: Duration },
     /// It is not started again.
@@ -167,19 +172,20 @@ impl Watch {
     pub fn step(&mut self, now: Duration) -> Step {
         let silent = |sign: Duration, limit_s: f64| now.saturating_sub(sign) >= Duration::from_secs_f64(limit_s);
         match self.stage {
-            Stage::Runs { sign, fresh: true, .. } if silent(sign, self.config.startup_s) => self.kill(),
-            Stage::Runs { sign, fresh: false, .. } if silent(sign, self.config.kill_s) => self.kill(),
+            Stage::Runs { sign, fresh: true, .. } if silent(sign, self.config.startup_s) => self.kill(now),
+            Stage::Runs { sign, fresh: false, .. } if silent(sign, self.config.kill_s) => self.kill(now),
             Stage::Runs { sign, fresh: false, warned: false } if silent(sign, self.config.warn_s) => {
                 self.stage = Stage::Runs { sign, fresh: false, warned: true };
                 Step::Warn
             }
+            Stage::Dies { since } if silent(since, DIES_S) => Step::Abandon,
             Stage::Waits { until } if now >= until => Step::Start,
             _ => Step::Nothing,
         }
     }
 
-    fn kill(&mut self) -> Step {
-        self.stage = Stage::Dies;
+    fn kill(&mut self, now: Duration) -> Step {
+        self.stage = Stage::Dies { since: now };
         Step::Kill
     }
 }
@@ -209,10 +215,21 @@ mod tests {
         assert_eq!(watch.step(ms(6100)), Step::Warn);
         assert_eq!(watch.step(ms(9099)), Step::Nothing);
         assert_eq!(watch.step(ms(9100)), Step::Kill);
-        assert_eq!(watch.step(ms(20_000)), Step::Nothing, "it is killed once");
-        assert_eq!(watch.sign(ms(20_001)), Heard::AsBefore, "what it has said before counts no more");
-        assert_eq!(watch.lost(ms(20_002)), Step::Nothing);
-        assert_eq!(watch.step(ms(20_202)), Step::Start);
+        assert_eq!(watch.step(ms(9500)), Step::Nothing, "it is killed once");
+        assert_eq!(watch.sign(ms(9501)), Heard::AsBefore, "what it has said before counts no more");
+        assert_eq!(watch.lost(ms(9502)), Step::Nothing);
+        assert_eq!(watch.step(ms(9702)), Step::Start);
+    }
+
+    #[test]
+    fn one_that_does_not_end_when_it_is_killed_is_left_alone_and_replaced() {
+        let mut watch = watch();
+        assert_eq!(watch.step(ms(3500)), Step::Warn);
+        assert_eq!(watch.step(ms(6500)), Step::Kill);
+        assert_eq!(watch.step(ms(7499)), Step::Nothing);
+        assert_eq!(watch.step(ms(7500)), Step::Abandon);
+        assert_eq!(watch.lost(ms(7500)), Step::Nothing);
+        assert_eq!(watch.step(ms(7700)), Step::Start);
     }
 
     #[test]

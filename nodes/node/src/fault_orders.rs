@@ -7,7 +7,8 @@ use swath_ros::Subscription;
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 
-use crate::node::{MissionNode, keep};
+use crate::node::MissionNode;
+use crate::patient::keep;
 use crate::stamp::Stamper;
 
 /// The file in which the spacecraft keeps what was ordered, for all nodes that are started again.
@@ -25,12 +26,12 @@ impl MissionNode {
         Ok(orders)
     }
 
-    /// Keeps all that was ordered for nodes that are started again.
+    /// Keeps all that was ordered for nodes that are started again; tells whether there was room for it.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn keep_fault_orders(&self, orders: &[Ordered]) -> Result<()> {
-        let Some(path) = self.keeps(KEPT) else { return Ok(()) };
+    pub fn keep_fault_orders(&self, orders: &[Ordered]) -> Result<bool> {
+        let Some(path) = self.keeps(KEPT) else { return Ok(true) };
         keep(&path, &serde_json::to_string(orders)?)
     }
 

@@ -9,5 +9,6 @@ pub mod node;
 pub mod orders;
 mod orders_heard;
 pub mod out;
+pub mod patient;
 pub mod program;
 pub mod stamp;

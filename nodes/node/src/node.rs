@@ -2,7 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::rc::Rc;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -365,17 +365,6 @@ impl MissionNode {
 fn tick_of(mission: &Mission, model: &Model) -> Duration {
     let seconds = if mission.pace > 0.0 { model.period.seconds() / mission.pace } else { 0.0 };
     Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
-}
-
-/// Keeps a text in a file, whole or not at all.
-///
-/// # Errors
-/// When it cannot be written.
-pub fn keep(path: &Path, text: &str) -> Result<()> {
-    let failed = || format!("cannot write {}", path.display());
-    let partial = path.with_extension("partial");
-    std::fs::write(&partial, text).with_context(failed)?;
-    std::fs::rename(&partial, path).with_context(failed)
 }
 
 /// Turns the outcome of a node into an exit code; an error is told once, in the log as soon as there is one.

@@ -36,6 +36,8 @@ pub(crate) struct Background {
 pub(crate) enum Fault {
     /// An older node of the same name has turned up.
     Namesake,
+    /// The mission has a later start of this node: this one was taken for lost.
+    Replaced,
     /// RustDDS does not answer any more.
     Deaf,
 }
@@ -48,6 +50,8 @@ pub(crate) struct Hearing {
     pub(crate) announcements: RawSubscription,
     /// Who the other processes say that they are.
     pub(crate) identities: RawSubscription,
+    /// Who this one is.
+    pub(crate) own: Identity,
 }
 
 struct Shared {
@@ -141,7 +145,7 @@ impl Shared {
             self.replies.release();
             let before = self.roster.revision();
             self.take_all(&hearing.announcements, |sample| self.roster.note_nodes(&sample.cdr));
-            self.take_all(&hearing.identities, |sample| self.note_identity(sample));
+            self.take_all(&hearing.identities, |sample| self.note_identity(&hearing.own, sample));
             if self.roster.revision() != before {
                 // Messages may wait for their writer to become known.
                 self.node_signal.raise();
@@ -167,7 +171,7 @@ impl Shared {
                     Ok(listener) => hearing.listener = listener,
                     Err(fault) => self.fail(fault),
                 }
-                (health, dropped) = (Health::after(health), Dropped::default());
+                (health, dropped) = (Health::after(health, ailment), Dropped::default());
             }
             self.signal.wait(ASK_EVERY);
         }
@@ -228,9 +232,14 @@ impl Shared {
         }
     }
 
-    fn note_identity(&self, sample: RawSample) {
+    fn note_identity(&self, own: &Identity, sample: RawSample) {
         match decode_as::<Identity>("Identity", &sample.cdr) {
-            Ok(identity) => self.roster.note_identity(sample.info.writer, identity),
+            Ok(identity) => {
+                if identity.replaces(own) {
+                    self.fail(Fault::Replaced);
+                }
+                self.roster.note_identity(sample.info.writer, identity);
+            }
             Err(error) => tracing::debug!("another process introduces itself wrongly: {error}"),
         }
     }

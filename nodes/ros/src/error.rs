@@ -57,6 +57,12 @@ pub enum RosError {
         /// The DDS domain.
         domain: u16,
     },
+    /// It was taken for lost, and another one has taken its place.
+    #[error("node {node} was taken for lost: the mission has started another one in its place, and this one ends")]
+    Replaced {
+        /// Fully qualified name.
+        node: String,
+    },
     /// RustDDS, inside this process, does not answer any more.
     #[error("node {node} neither hears nor speaks any more: its DDS has died; start it again")]
     Deaf {

@@ -12,7 +12,7 @@ pub(crate) const ASK_EVERY: Duration = Duration::from_secs(1);
 const UNANSWERED: u32 = 5;
 /// The host's clock has been set back if it has lost more than this.
 const STEP_BACK: Duration = Duration::from_millis(500);
-/// So many cures in [`CURES_WITHIN`] and another one is no use.
+/// So many cures of deafness in [`CURES_WITHIN`] and another one is no use.
 const CURES: usize = 3;
 const CURES_WITHIN: Duration = Duration::from_secs(60);
 
@@ -23,6 +23,8 @@ pub(crate) enum Ailment {
     Deaf,
     /// The host's clock was set back: until it has caught up, RustDDS hears of no new participant.
     ClockBack,
+    /// It was cut off from others that RustDDS has given up, and that are there again.
+    CutOff,
     /// It was cured again and again.
     Incurable,
 }
@@ -33,6 +35,7 @@ impl Ailment {
         match self {
             Self::Deaf => "it did not answer any more",
             Self::ClockBack => "the host's clock was set back",
+            Self::CutOff => "it was cut off from others",
             Self::Incurable => "it fails again and again",
         }
     }
@@ -51,11 +54,19 @@ impl Health {
         Self { asked: None, unanswered: 0, clocks: Clocks::now(), cures: VecDeque::new() }
     }
 
-    /// After a cure.
-    pub(crate) fn after(former: Self) -> Self {
+    /// After a cure. A clock that is set back or a network that parts, however often, is no failure of RustDDS.
+    pub(crate) fn after(former: Self, cured: Ailment) -> Self {
         let mut cures = former.cures;
-        cures.push_back(Instant::now());
+        if cured == Ailment::Deaf {
+            cures.push_back(Instant::now());
+        }
         Self { cures, ..Self::new() }
+    }
+
+    /// What ails it, if it is this: it may be incurable.
+    fn diagnosis(&mut self, ailment: Ailment, now: Instant) -> Ailment {
+        self.cures.retain(|cure| now.saturating_duration_since(*cure) < CURES_WITHIN);
+        if ailment == Ailment::Deaf && self.cures.len() >= CURES { Ailment::Incurable } else { ailment }
     }
 
     /// Asks RustDDS whether it hears and speaks, once in a while, and tells what ails it.
@@ -77,13 +88,14 @@ impl Health {
         let clocks = Clocks::now();
         let back = clocks.has_gone_back_since(&self.clocks);
         self.clocks = clocks;
+        let reunited = roster.take_reunited();
         let ailment = match (self.unanswered >= UNANSWERED, back) {
             (true, _) => Ailment::Deaf,
             (false, true) => Ailment::ClockBack,
+            (false, false) if reunited => Ailment::CutOff,
             (false, false) => return None,
         };
-        self.cures.retain(|cure| now.duration_since(*cure) < CURES_WITHIN);
-        Some(if self.cures.len() < CURES { ailment } else { Ailment::Incurable })
+        Some(self.diagnosis(ailment, now))
     }
 }
 
@@ -109,6 +121,23 @@ impl Clocks {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn it_is_cured_three_times_a_minute_and_of_a_clock_that_was_set_back_however_often() {
+        let mut health = Health::new();
+        let now = Instant::now();
+        for _ in 0..20 {
+            assert_eq!(health.diagnosis(Ailment::ClockBack, now), Ailment::ClockBack);
+            health = Health::after(health, Ailment::ClockBack);
+        }
+        for _ in 0..CURES {
+            assert_eq!(health.diagnosis(Ailment::Deaf, now), Ailment::Deaf);
+            health = Health::after(health, Ailment::Deaf);
+        }
+        assert_eq!(health.diagnosis(Ailment::ClockBack, now), Ailment::ClockBack);
+        assert_eq!(health.diagnosis(Ailment::Deaf, now), Ailment::Incurable);
+        assert_eq!(health.diagnosis(Ailment::Deaf, now + 2 * CURES_WITHIN), Ailment::Deaf);
+    }
 
     #[test]
     fn only_a_clock_that_was_set_back_is_noticed() {

@@ -24,6 +24,14 @@ pub(crate) struct Identity {
     pub(crate) epoch: u64,
 }
 
+impl Identity {
+    /// Whether this is a later start of the same node of a mission.
+    pub(crate) fn replaces(&self, other: &Self) -> bool {
+        let mission = |it: &Self| (it.namespace.clone(), it.fleet.clone(), it.node.clone());
+        !self.fleet.is_empty() && mission(self) == mission(other) && self.epoch > other.epoch
+    }
+}
+
 /// How long a process may take to say who it is.
 pub(crate) const INTRODUCTION: Duration = Duration::from_secs(2);
 
@@ -49,6 +57,10 @@ pub(crate) struct Members {
     order: u64,
     /// When an unknown process was met first.
     met: BTreeMap<Prefix, Instant>,
+    /// Processes that DDS has given up.
+    lost: BTreeSet<Prefix>,
+    /// One of them is there again, and it is this process that begins anew.
+    pub(crate) reunited: bool,
 }
 
 /// A process that has said who it is.
@@ -88,6 +100,21 @@ impl Members {
             known.gone = Some(now);
         }
         self.heard.retain(|_, known| known.gone.is_none_or(|gone| now.saturating_duration_since(gone) < MEMORY));
+        self.lost.insert(process);
+        self.lost.retain(|process| self.heard.contains_key(process));
+    }
+
+    /// DDS has found a process; `member` is this one, if it belongs to the mission.
+    ///
+    /// What one said that RustDDS gave up, it takes in no more, should that be there again after all: one of both has to
+    /// begin anew. Who is no member does; of two members the one with the lesser identity.
+    pub(crate) fn find(&mut self, process: Prefix, member: Option<Prefix>) {
+        let again = self.lost.remove(&process);
+        if again && member.is_none_or(|own| own < process && self.name_of(process).is_some()) {
+            self.reunited = true;
+            // To whoever begins anew they are all new.
+            self.lost.clear();
+        }
     }
 
     /// Name of the mission's node that this process is.
@@ -209,6 +236,38 @@ mod tests {
         assert_eq!(members.name_of([8; 12]), Some("planner"));
         members.lose([1; 12], Instant::now() + 2 * MEMORY);
         assert!(!members.heard.contains_key(&[6; 12]));
+    }
+
+    #[test]
+    fn after_a_cut_one_of_both_begins_anew() {
+        let cut = |own: Option<Prefix>, node: &str, fleet: &str| {
+            let mut members = members();
+            members.note([5; 12], identity(node, fleet, 0));
+            members.note([6; 12], identity(node, fleet, 1));
+            members.find([5; 12], own);
+            assert!(!members.reunited, "it was there all the time");
+            members.lose([5; 12], Instant::now());
+            members.lose([6; 12], Instant::now());
+            members.find([6; 12], own);
+            let reunited = std::mem::take(&mut members.reunited);
+            members.find([6; 12], own);
+            assert!(!members.reunited, "once");
+            reunited
+        };
+        assert!(cut(None, "planner", "g"), "who looks on from outside");
+        assert!(cut(Some([1; 12]), "planner", "f"));
+        assert!(!cut(Some([9; 12]), "planner", "f"), "the other one does");
+        assert!(!cut(Some([1; 12]), "planner", "g"), "no stranger makes a mission begin anew");
+    }
+
+    #[test]
+    fn a_later_start_of_the_same_node_of_the_same_mission_replaces_it() {
+        let own = identity("planner", "f", 1);
+        assert!(identity("planner", "f", 2).replaces(&own));
+        for other in [identity("planner", "f", 1), identity("planner", "g", 2), identity("guidance", "f", 2)] {
+            assert!(!other.replaces(&own), "{other:?}");
+        }
+        assert!(!identity("planner", "", 2).replaces(&identity("planner", "", 1)), "there is no mission");
     }
 
     #[test]

@@ -117,6 +117,7 @@ impl Node {
             listener: participant.status_listener(),
             announcements: listen(ros_discovery::TOPIC_NAME, ParticipantEntitiesInfo::TYPE_NAME)?,
             identities: listen(IDENTITIES, IDENTITY_TYPE)?,
+            own: identity.clone(),
         };
         let introduction = dds.writer(plan(IDENTITIES, IDENTITY_TYPE, &latched)?)?;
         let replies = AllReplies::default();
@@ -346,12 +347,14 @@ impl Node {
     /// themselves.
     ///
     /// # Errors
-    /// If another node that came up together with it has its name, or if its DDS has died.
+    /// If another node that came up together with it has its name, if another one has taken its place, or if its DDS
+    /// has died.
     pub fn check(&self) -> Result<(), RosError> {
         self.pulse.beat(self.clock.now_ns());
         match self.background.fault() {
             None => Ok(()),
             Some(Fault::Namesake) => Err(self.duplicate()),
+            Some(Fault::Replaced) => Err(RosError::Replaced { node: self.names.fully_qualified() }),
             Some(Fault::Deaf) => Err(RosError::Deaf { node: self.names.fully_qualified() }),
         }
     }

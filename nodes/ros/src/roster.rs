@@ -104,6 +104,7 @@ impl Roster {
         let mut state = lock(&self.state);
         let former = std::mem::replace(&mut *state, State::new(own, Members::default()));
         state.members = former.members;
+        state.announced = Instant::now().checked_sub(TOGETHER); // It yields to nobody, least to its former self.
         state.readers = former.readers.iter().map(renewed).collect();
         state.writers = former.writers.iter().map(renewed).collect();
         state.table = former.table.iter().map(|(way, gid, entry)| (*way, renewed(gid), *entry)).collect();
@@ -114,7 +115,7 @@ impl Roster {
     /// Lets the other processes know of this node, now and whenever its endpoints change.
     pub(crate) fn announce(&self) {
         let mut state = lock(&self.state);
-        state.announced = Some(Instant::now());
+        state.announced.get_or_insert_with(Instant::now);
         self.publish(&state);
     }
 
@@ -241,8 +242,10 @@ impl Roster {
             Event::RemoteWriterMatched { local_reader, remote_writer } => {
                 state.match_up(local_reader.into(), remote_writer.into());
             }
-            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                state.lose(guid.into());
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => state.lose(guid.into()),
+            Event::ParticipantDiscovered { dpd } => {
+                let own = prefix_of(state.own);
+                state.members.find(prefix_of(dpd.guid.into()), self.member.then_some(own));
             }
             Event::ParticipantLost { id, reason } => {
                 if matches!(reason, LostReason::Timeout { .. }) {
@@ -250,12 +253,8 @@ impl Roster {
                 }
                 state.lose_participant(id.as_ref());
             }
-            Event::RemoteReaderQosIncompatible { remote_reader, .. } => {
-                state.refuse(remote_reader.into(), "a reader");
-            }
-            Event::RemoteWriterQosIncompatible { remote_writer, .. } => {
-                state.refuse(remote_writer.into(), "a writer");
-            }
+            Event::RemoteReaderQosIncompatible { remote_reader, .. } => state.refuse(remote_reader.into(), "a reader"),
+            Event::RemoteWriterQosIncompatible { remote_writer, .. } => state.refuse(remote_writer.into(), "a writer"),
             _ => return,
         }
         drop(state);
@@ -381,6 +380,11 @@ impl Roster {
     /// Fully qualified names of all nodes of the other processes.
     pub(crate) fn nodes(&self) -> BTreeSet<String> {
         lock(&self.state).nodes.values().flatten().map(fully_qualified).collect()
+    }
+
+    /// Whether this node has to begin anew for one that was cut off and is there again.
+    pub(crate) fn take_reunited(&self) -> bool {
+        std::mem::take(&mut lock(&self.state).members.reunited)
     }
 
     /// How often each node of our namespace was started.

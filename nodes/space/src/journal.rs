@@ -1,20 +1,21 @@
 //! What a node has taken in, in order, kept so that one that is started again is where the one before was, to the bit.
 
-use std::fs::{File, OpenOptions};
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::fs::OpenOptions;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::marker::PhantomData;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use swath_node::patient::Appended;
 
 /// Length of what stands before an entry: its own length and its checksum [B].
 const HEAD: usize = 8;
 
 /// A file to which each entry is added before anything that follows from it is said.
 pub struct Journal<E> {
-    file: File,
+    file: Appended,
     entries: PhantomData<fn(E)>,
 }
 
@@ -38,20 +39,21 @@ impl<E: Serialize + DeserializeOwned> Journal<E> {
         let whole = (bytes.len() - rest.len()) as u64;
         file.set_len(whole).with_context(failed)?;
         file.seek(SeekFrom::Start(whole)).with_context(failed)?;
-        Ok((Self { file, entries: PhantomData }, taken))
+        Ok((Self { file: Appended::new(file), entries: PhantomData }, taken))
     }
 
-    /// Adds an entry.
+    /// Adds an entry. Where there is no room it waits for some: a node that is lost meanwhile is replaced by one that
+    /// knows nothing of it.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// When it cannot be written for another reason.
     pub fn add(&mut self, entry: &E) -> Result<()> {
         let body = postcard::to_allocvec(entry)?;
         let mut bytes = Vec::with_capacity(HEAD + body.len());
         bytes.extend(u32::try_from(body.len())?.to_le_bytes());
         bytes.extend(crc32fast::hash(&body).to_le_bytes());
         bytes.extend(body);
-        self.file.write_all(&bytes).context("cannot keep what was taken in")
+        self.file.add(&bytes).map(|_| ()).context("cannot keep what was taken in")
     }
 }
 
@@ -79,7 +81,7 @@ mod tests {
         assert_eq!(before, Vec::<(u64, String)>::new());
         entries.iter().for_each(|entry| journal.add(entry).unwrap());
         for torn in [&[7, 0, 0][..], &[1, 0, 0, 0, 9, 9, 9, 9, 5], &[255; 12]] {
-            journal.file.write_all(torn).unwrap();
+            journal.file.add(torn).unwrap();
             let (again, before) = Journal::<(u64, String)>::open(&path, true).unwrap();
             assert_eq!(before, entries);
             journal = again;

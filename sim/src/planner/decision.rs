@@ -151,6 +151,11 @@ pub trait Planner {
     fn rationale(&self) -> Option<Rationale> {
         None
     }
+
+    /// Another one that goes on from here as this one would; none from a planner that cannot be doubled.
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        None
+    }
 }
 
 /// How long to wait when there is no candidate at all [s].

@@ -75,6 +75,15 @@ impl Flight {
         self.torque_pending = situation.torque_pending;
     }
 
+    /// Goes on from what is known of the satellite at another time, with the wheels that it is known to have.
+    pub fn resume(&mut self, model: &Model, situation: &Situation) {
+        self.rewind(situation);
+        if health::lost(&situation.wheels) {
+            self.spacecraft.refit(model.plant.limited(&situation.wheels));
+            self.executive.guidance.wheel_lost = true;
+        }
+    }
+
     /// Simulated time.
     #[must_use]
     pub fn now(&self) -> Tick {

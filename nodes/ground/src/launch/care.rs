@@ -104,6 +104,8 @@ impl Launcher {
             }
             Happened::Back { .. } => {
                 self.tell(tick, &lost, false, "it is there again");
+                // One that stands in in safe mode holds, whether that is heard before an operator lets it choose or not.
+                self.held |= node == graph::PLANNER && self.safe_mode.is_some();
                 self.room_since = (node == graph::RECORDER).then(Instant::now).or(self.room_since);
             }
             Happened::GivenUp { how } => {

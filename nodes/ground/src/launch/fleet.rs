@@ -26,6 +26,8 @@ pub struct Fleet {
     /// Simulated time as the nodes know it [ns].
     now_ns: u64,
     keeping: Keeping,
+    /// Whether there was no room to keep who flies.
+    unkept: bool,
 }
 
 /// What has become of a process.
@@ -80,6 +82,8 @@ struct Member {
     /// Parameters of the next start.
     extra: Vec<String>,
     running: Option<Running>,
+    /// Those that were killed and did not end: they count no more, and may end some time.
+    abandoned: Vec<Running>,
     watch: Watch,
     /// How often it was started again.
     epoch: u64,
@@ -97,7 +101,7 @@ struct Member {
 impl Fleet {
     /// No processes yet.
     pub fn new(config: &SupervisionConfig, keeping: Keeping) -> Self {
-        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0, keeping }
+        Self { members: Vec::new(), config: config.clone(), began: Instant::now(), now_ns: 0, keeping, unkept: false }
     }
 
     /// The processes that a launcher before has left; those that have ended meanwhile are started again.
@@ -118,9 +122,10 @@ impl Fleet {
     }
 
     /// Keeps who flies.
-    fn keep(&self) -> Result<()> {
+    fn keep(&mut self) -> Result<()> {
         let members: Vec<KeptMember> = self.members.iter().map(Member::kept).collect();
-        self.keeping.keep_fleet(&members)
+        self.unkept = !self.keeping.keep_fleet(&members)?;
+        Ok(())
     }
 
     /// Starts a program of this suite: the one beside this executable, or else the one on the PATH. The words end with
@@ -149,6 +154,7 @@ impl Fleet {
             args: args.to_vec(),
             extra: Vec::new(),
             running: None,
+            abandoned: Vec::new(),
             watch: Watch::new(self.config.clone(), self.began.elapsed()),
             epoch: 0,
             struck: 0,
@@ -242,7 +248,7 @@ impl Fleet {
             let happened = member.supervise(now, &mut self.now_ns, &self.config, &self.keeping)?;
             events.extend(happened.into_iter().map(|what| Event { node: member.name.clone(), what }));
         }
-        if self.members.iter().map(Member::marks).ne(before) {
+        if self.unkept || self.members.iter().map(Member::marks).ne(before) {
             self.keep()?;
         }
         Ok(events)
@@ -346,6 +352,7 @@ impl Member {
                 tracing::warn!("node {} gives no sign of life and is killed", self.name);
                 self.kill()?;
             }
+            Step::Abandon => told.push(self.abandon(now, now_ns)),
             Step::Start => {
                 self.epoch += 1;
                 self.start(config, keeping)?;
@@ -366,20 +373,38 @@ impl Member {
         Some(Happened::Back { by_order: std::mem::take(&mut self.by_order) })
     }
 
+    /// Its process does not end though it was killed: it is left to itself.
+    fn abandon(&mut self, now: Duration, now_ns: &mut u64) -> Happened {
+        // Which of them have ended meanwhile is of no account, but that they are waited for.
+        self.abandoned.retain_mut(|old| !matches!(old.ended(), Ok(Some(_))));
+        self.hear_out(now, now_ns);
+        if let Some(mut running) = self.running.take() {
+            running.leave();
+            self.abandoned.push(running);
+        }
+        let how = format!("node {} gives no sign of life and does not end though it was killed", self.name);
+        self.is_lost(how, now, false)
+    }
+
     /// Its process has ended.
     fn over(&mut self, ending: Ending, now: Duration, now_ns: &mut u64) -> Happened {
         self.hear_out(now, now_ns);
         self.running = None;
-        self.lost = true;
         let how = ending.of(&self.name);
         self.no_room = self.name == graph::RECORDER && ending.code() == Some(i32::from(NO_ROOM));
         if self.no_room {
+            self.lost = true;
             tracing::warn!("{how}: there is no room for the bag");
             self.watch.wants(now);
             return Happened::NoRoom;
         }
         // One that ends by itself has said why, and would do so again.
-        let leaves = self.beside && !ending.is_killed();
+        self.is_lost(how, now, self.beside && !ending.is_killed())
+    }
+
+    /// It is gone, and is started again unless it leaves for good.
+    fn is_lost(&mut self, how: String, now: Duration, leaves: bool) -> Happened {
+        self.lost = true;
         let step = if leaves { self.watch.give_up() } else { self.watch.lost(now) };
         tracing::warn!("{how}");
         match step {
@@ -424,6 +449,7 @@ impl Member {
         while let Ok(line) = running.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
             self.hear(&line, now, now_ns);
         }
+        self.running = Some(running);
     }
 
     fn kill(&mut self) -> Result<()> {
@@ -439,6 +465,8 @@ impl Drop for Fleet {
         for running in self.members.iter_mut().filter_map(|member| member.running.as_mut()) {
             let _ = running.stop();
         }
+        let abandoned = self.members.iter_mut().flat_map(|member| &mut member.abandoned);
+        abandoned.for_each(|running| _ = (running.send(Signal::KILL), running.ended()));
     }
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use swath_mission::alarms::conditions::Report;
 use swath_mission::alarms::wishes::Wish;
 use swath_mission::fallback::Deciders;
-use swath_node::node::keep;
+use swath_node::patient::keep;
 use swath_sim::time::Tick;
 
 use super::process::Name;
@@ -110,8 +110,8 @@ impl Keeping {
         }
     }
 
-    /// Keeps who flies.
-    pub fn keep_fleet(&self, members: &[KeptMember]) -> Result<()> {
+    /// Keeps who flies; tells whether there was room for it.
+    pub fn keep_fleet(&self, members: &[KeptMember]) -> Result<bool> {
         self.write(FLEET, &members)
     }
 
@@ -120,8 +120,8 @@ impl Keeping {
         self.read(FLEET)
     }
 
-    /// Keeps what is known of the flight.
-    pub fn keep_flight(&self, flight: &KeptFlight) -> Result<()> {
+    /// Keeps what is known of the flight; tells whether there was room for it.
+    pub fn keep_flight(&self, flight: &KeptFlight) -> Result<bool> {
         self.write(LAUNCHER, flight)
     }
 
@@ -130,7 +130,7 @@ impl Keeping {
         self.read(LAUNCHER)
     }
 
-    fn write(&self, name: &str, value: &impl Serialize) -> Result<()> {
+    fn write(&self, name: &str, value: &impl Serialize) -> Result<bool> {
         keep(&self.0.join(name), &serde_json::to_string(value)?)
     }
 

@@ -27,6 +27,7 @@ use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::fallback::{GuardedPlanner, Policies, made_instead};
 use swath_mission::file::Mission;
 use swath_mission::in_process::InProcessMission;
+use swath_mission::link::config::LinkConfig;
 use swath_mission::orders::order::Order;
 use swath_mission::origin::Origins;
 use swath_mission::outcome::{Summary, SummaryInputs};
@@ -207,10 +208,13 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
+        let predicts = |link: &LinkConfig| link.predicts_h(mission.pace) > 0.0;
+        let learned = matches!(mission.planner, PlannerSpec::Learned { .. });
         let wishes = Wishes {
             record: !args.no_bag,
             console: args.console,
             radio: mission.link.is_some(),
+            foresees_policy: learned && mission.link.as_ref().is_some_and(predicts),
             external: &mission.nodes.external(),
         };
         over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)
@@ -245,7 +249,7 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     progress.finish();
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
-    output.write_alarms(&flight.board().take_journal())?;
+    output.finish(&flight.board().take_journal())?;
     output.write_ways(&flight.ways())?;
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {

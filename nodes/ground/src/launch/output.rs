@@ -1,11 +1,11 @@
 //! The folder that a mission leaves behind.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, bail};
 use serde::Serialize;
+use swath_node::patient::{Appended, keep};
 
 use swath_mission::alarms::Entry;
 use swath_mission::file::{Mission, MissionRequests};
@@ -32,7 +32,7 @@ pub struct OutputFolder {
     path: PathBuf,
     /// Whether it was not there before.
     made: bool,
-    tasks: BufWriter<File>,
+    tasks: Appended,
 }
 
 impl OutputFolder {
@@ -50,7 +50,7 @@ impl OutputFolder {
         }
         let tasks = path.join("tasks.jsonl");
         let tasks = File::create(&tasks).with_context(|| format!("cannot write {}", tasks.display()))?;
-        Ok(Self { path, made, tasks: BufWriter::new(tasks) })
+        Ok(Self { path, made, tasks: Appended::new(tasks) })
     }
 
     /// The folder of a mission that was begun, and the tasks that are written there. A line that is not whole is dropped.
@@ -63,7 +63,7 @@ impl OutputFolder {
         let lines = lines.collect::<Result<Vec<TaskLine>, _>>().with_context(failed)?;
         let file = fs::OpenOptions::new().append(true).open(&tasks).with_context(failed)?;
         file.set_len(whole as u64).with_context(failed)?;
-        Ok((Self { path: path.to_owned(), made: false, tasks: BufWriter::new(file) }, lines))
+        Ok((Self { path: path.to_owned(), made: false, tasks: Appended::new(file) }, lines))
     }
 
     /// Removes all that is in the folder, so that it can be asked for again: nothing was flown.
@@ -106,34 +106,45 @@ impl OutputFolder {
         Ok(path)
     }
 
-    /// Appends a line to `tasks.jsonl`.
+    /// Appends a line to `tasks.jsonl`; where there is no room it waits for some.
     pub fn write_task(&mut self, line: &TaskLine) -> Result<()> {
-        serde_json::to_writer(&mut self.tasks, line)?;
-        self.tasks.write_all(b"\n")?;
-        Ok(self.tasks.flush()?)
+        let mut line = serde_json::to_vec(line)?;
+        line.push(b'\n');
+        self.tasks.add(&line)?;
+        Ok(())
     }
 
-    /// Writes what happened to alarms as `alarms.jsonl`, if anything did.
-    pub fn write_alarms(&self, journal: &[Entry]) -> Result<()> {
+    /// Writes what happened to alarms as `alarms.jsonl`, if anything did; tells whether there was room for it.
+    pub fn write_alarms(&self, journal: &[Entry]) -> Result<bool> {
         self.write_lines("alarms.jsonl", journal)
+    }
+
+    /// Writes what waits for room, and what happened to alarms: the mission is over.
+    pub fn finish(&mut self, journal: &[Entry]) -> Result<()> {
+        if !self.tasks.add(&[])? || !self.write_alarms(journal)? {
+            bail!("there is no room for tasks and alarms in {}", self.path.display());
+        }
+        Ok(())
     }
 
     /// Writes the ways of requests over the radio as `strips.jsonl`, if there is a radio.
     pub fn write_ways(&self, ways: &[WayLine]) -> Result<()> {
-        self.write_lines("strips.jsonl", ways)
+        if !self.write_lines("strips.jsonl", ways)? {
+            bail!("there is no room for the ways of requests in {}", self.path.display());
+        }
+        Ok(())
     }
 
-    fn write_lines(&self, name: &str, lines: &[impl Serialize]) -> Result<()> {
+    fn write_lines(&self, name: &str, lines: &[impl Serialize]) -> Result<bool> {
         if lines.is_empty() {
-            return Ok(());
+            return Ok(true);
         }
         let mut text = String::new();
         for line in lines {
             text += &serde_json::to_string(line)?;
             text.push('\n');
         }
-        let path = self.path.join(name);
-        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+        keep(&self.path.join(name), &text)
     }
 
     /// Writes `summary.json`.

@@ -114,7 +114,7 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
     let Some(flown) = launcher.flown else {
         return Err(watched.err().unwrap_or_else(|| anyhow!("the mission has not begun")));
     };
-    output.write_alarms(&launcher.alarms.journal(flown.end))?;
+    output.finish(&launcher.alarms.journal(flown.end))?;
     // The recorder ends first: the nodes' last messages reach it while they are still there.
     let recorded = fleet.stop(&[graph::RECORDER]).and_then(|()| match record {
         true => count_messages(&output.path().join("bag")),
@@ -356,7 +356,8 @@ impl Launcher {
         self.kept_at = Some(Instant::now());
         let (reports, wishes) = self.alarms.kept();
         let flown_s = self.flown.map_or(0.0, |flown| (flown.last - flown.began).as_secs_f64());
-        self.keeping.keep_flight(&KeptFlight {
+        // Without room for it, what was kept before stands until the next time.
+        let _ = self.keeping.keep_flight(&KeptFlight {
             epoch: self.epoch,
             domain: self.node.environment().domain,
             namespace: self.node.names().namespace().to_owned(),
@@ -368,7 +369,8 @@ impl Launcher {
             at: self.alarms.now().max(self.recorder_since),
             safe_mode: self.safe_mode.clone(),
             flown_s: self.flown_before_s + flown_s,
-        })
+        })?;
+        Ok(())
     }
 
     /// Follows the mission to its end.
@@ -478,8 +480,8 @@ impl Launcher {
             self.unwritten.get_or_insert_with(Instant::now);
         }
         if self.unwritten.is_some_and(|since| since.elapsed() > JOURNAL_DELAY) {
-            output.write_alarms(&self.alarms.journal(now))?;
-            self.unwritten = None;
+            let written = output.write_alarms(&self.alarms.journal(now))?;
+            self.unwritten = (!written).then(Instant::now);
         }
         Ok(())
     }

@@ -8,13 +8,15 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
 use serde::{Deserialize, Serialize};
 
 /// How long a process may take to end after it was asked to.
 const STOP_TIMEOUT: Duration = Duration::from_secs(20);
+/// How long it may take to end once it is killed.
+const KILL_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Names a process for as long as the machine runs: numbers are used again, with another start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -104,13 +106,22 @@ impl Running {
         }
     }
 
-    /// Asks it to end and waits until it has; one that does not end is killed.
+    /// Listens to it no longer: should it speak again, it finds that it has no launcher.
+    pub fn leave(&mut self) {
+        self.lines = channel().1;
+    }
+
+    /// Asks it to end and waits until it has; one that does not end is killed. One that does not end even then is an
+    /// error.
     pub fn stop(&mut self) -> Result<Ending> {
         self.send(Signal::INT)?;
         let deadline = Instant::now() + STOP_TIMEOUT;
         loop {
             if let Some(ending) = self.ended()? {
                 return Ok(ending);
+            }
+            if Instant::now() > deadline + KILL_TIMEOUT {
+                bail!("process {} does not end though it was killed", self.pid());
             }
             if Instant::now() > deadline {
                 self.send(Signal::KILL)?;
@@ -202,6 +213,24 @@ mod tests {
         assert!(matches!(left.ended().unwrap(), Some(Ending::Gone)));
         left.send(Signal::KILL).unwrap();
         assert!(Running::take_over(name, &signs).unwrap().is_none());
+    }
+
+    #[test]
+    fn one_that_is_left_cannot_speak_any_more() {
+        let speaks = "while true; do echo alive 1; sleep 0.05; done";
+        let mut child = Running::start(Command::new("sh").args(["-c", speaks])).unwrap();
+        assert_eq!(child.lines.recv_timeout(Duration::from_secs(20)).unwrap(), "alive 1");
+        child.leave();
+        let deadline = Instant::now() + Duration::from_secs(20);
+        let ending = loop {
+            if let Some(ending) = child.ended().unwrap() {
+                break ending;
+            }
+            assert!(Instant::now() < deadline, "it speaks on");
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        // As a broken pipe ends a program that does not mind it.
+        assert!(ending.is_killed());
     }
 
     #[test]

@@ -23,6 +23,8 @@ const LAUNCHER: &str = "launcher";
 
 /// The alarm of messages that are dropped.
 const MESSAGES_DROPPED: &str = "messages dropped";
+/// The alarm of frames of the radio that are lost by order.
+const FRAMES_LOST: &str = "frames lost";
 /// The alarm of a store that cannot be written.
 pub const STORE_FULL: &str = "store full";
 /// The alarm of a bag that cannot be written.
@@ -156,6 +158,7 @@ fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
         What::Process(process, Failure::Kill) => alarm(format!("{} lost", process.name()), "killed by order"),
         What::Process(process, Failure::Hang) => alarm(format!("{} lost", process.name()), "hangs by order"),
         What::Drop(_) => alarm(MESSAGES_DROPPED.to_owned(), &format!("{} by order", it.what)),
+        What::FramesLost(_) => alarm(FRAMES_LOST.to_owned(), &format!("{} by order", it.what)),
         What::StoreFull => alarm(STORE_FULL.to_owned(), "full by order"),
         What::BagFull => alarm(BAG_FULL.to_owned(), "full by order"),
         What::Vehicle(_) => None,

@@ -183,6 +183,15 @@ pub const DEFINITIONS: &[Definition] = &[
         ],
     ),
     lasting(
+        "frames lost",
+        Severity::Warn,
+        [
+            "frames of the radio are lost, by order",
+            "what does not get through is sent again; orders and results come later, or at the next pass",
+            "nothing, if it returns; plan no drill for the time of an important pass",
+        ],
+    ),
+    lasting(
         "store full",
         Severity::Error,
         [

@@ -20,7 +20,8 @@ use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::PACED_PATIENCE;
 use swath_node::lifecycle::{self, LifecycleNode};
-use swath_node::node::{MissionNode, Severity, keep};
+use swath_node::node::{MissionNode, Severity};
+use swath_node::patient::keep;
 use swath_node::program::{PACE, Program};
 
 /// How long a question without an answer waits before it is asked again.
@@ -367,8 +368,7 @@ impl GuidanceNode {
     fn keep(&mut self) -> Result<()> {
         let Some(path) = self.base.keeps(KEPT) else { return Ok(()) };
         let marks = self.logic.marks();
-        if self.kept != Some(marks) {
-            keep(&path, &messages::kept_text(&self.logic.kept())?)?;
+        if self.kept != Some(marks) && keep(&path, &messages::kept_text(&self.logic.kept())?)? {
             self.kept = Some(marks);
         }
         Ok(())

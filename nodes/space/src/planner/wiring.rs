@@ -21,7 +21,8 @@ use swath_mission::fallback::{GuardedPlanner, Policies};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
 use swath_node::lifecycle::{self, LifecycleNode};
-use swath_node::node::{MissionNode, Severity, keep};
+use swath_node::node::{MissionNode, Severity};
+use swath_node::patient::keep;
 use swath_node::program::{Parameter, Program};
 
 const PLANNER_PARAMETER: Parameter =
@@ -76,6 +77,8 @@ struct PlannerNode {
     /// Why another planner decides in its place, as it was told last.
     fault_told: Option<String>,
     now: Tick,
+    /// What an operator set and there was no room to keep.
+    unkept: Option<Mode>,
     /// When there is no planner, by order.
     away: Vec<Scheduled>,
     base: MissionNode,
@@ -106,6 +109,7 @@ impl PlannerNode {
             strips: Vec::new(),
             last: None,
             now: Tick(0),
+            unkept: None,
             fault_told: None,
             away: away(&base),
             base,
@@ -194,8 +198,11 @@ impl PlannerNode {
             }
             Err(reason) => msg::ReviewProposalResponse { reason, ..Default::default() },
         })?;
-        if let (Some(path), Some(mode)) = (self.base.keeps(KEPT), set) {
-            keep(&path, &serde_json::to_string(&mode)?)?;
+        self.unkept = set.or(self.unkept);
+        if let (Some(path), Some(mode)) = (self.base.keeps(KEPT), self.unkept)
+            && keep(&path, &serde_json::to_string(&mode)?)?
+        {
+            self.unkept = None;
         }
         for action in taken {
             self.actions.publish(&operator_action(&self.base.stamper, &action))?;

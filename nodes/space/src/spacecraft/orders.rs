@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use swath_mission::faults::orders::Ordered;
 use swath_msgs::swath_msgs as msg;
 use swath_node::fault_orders::fault_orders;
@@ -61,8 +61,13 @@ impl OrderDesk {
         let (horizon, period) = (base.horizon, base.model.period);
         let mut plan = base.mission.faults.clone();
         let (order, scheduled) = plan.take_order(&call.fault, &call.actor, now, horizon, period)?;
+        if base.mission.link.is_none() {
+            plan.fits_no_radio()?;
+        }
         let all: Vec<Ordered> = self.taken.iter().cloned().chain([order.clone()]).collect();
-        base.keep_fault_orders(&all)?;
+        if !base.keep_fault_orders(&all)? {
+            bail!("there is no room to keep it, and what is not kept is not ordered");
+        }
         self.taken = all;
         base.add_fault(&order);
         tracing::info!("{} orders {}", order.actor, order.fault);

@@ -81,6 +81,10 @@ impl Planner for Beam {
         "beam".to_owned()
     }
 
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn forget(&mut self) {
         self.experience.forget();
     }

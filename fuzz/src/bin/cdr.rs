@@ -1,0 +1,4 @@
+//! The bytes of messages.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| swath_fuzz::cdr(bytes));

@@ -1,0 +1,4 @@
+//! Mission files.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| swath_fuzz::missions(bytes));

@@ -1,0 +1,4 @@
+//! Command lines.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| swath_fuzz::words(bytes));
