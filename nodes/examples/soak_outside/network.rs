@@ -72,7 +72,7 @@ pub fn parts(mission: &Mission) -> Result<Value> {
     swath.env("ROS_DOMAIN_ID", sortie::own_domain().to_string()).env("ROS_LOCALHOST_ONLY", "0");
     let mut flight = Flight::start(swath, &file, &out, &[])?;
     flight.wait_for_tasks(1)?;
-    let parted = part(&out)?;
+    let parted = part(&out, &pid)?;
     let (_, summary, _) = flight.end()?;
     ensure!(summary.failure.is_none(), "it has failed: {:?}: {}", summary.failure, flight.said());
     drop(operator.stdin.take());
@@ -86,14 +86,19 @@ pub fn parts(mission: &Mission) -> Result<Value> {
     Ok(json!({ "parts_acknowledged": acknowledged.len(), "parts_answered_after_s": [after - parted.1] }))
 }
 
-/// Parts the networks for a while; from when to when [s since 1970].
-fn part(out: &Path) -> Result<(f64, f64)> {
+/// Parts the networks for a while, on the operator's side: what the satellite's nodes say to each other goes over their
+/// end of the line, too. From when to when [s since 1970].
+fn part(out: &Path, operator: &str) -> Result<(f64, f64)> {
     std::thread::sleep(Duration::from_secs(15));
+    let nft = |words: &str| {
+        let there = ["-t", operator, "-n", "nft"].into_iter().chain(words.split(' ')).collect::<Vec<_>>();
+        command("nsenter", &there)
+    };
     nft("add table inet f")?;
     nft("add chain inet f in { type filter hook input priority 0 ; }")?;
     nft("add chain inet f out { type filter hook output priority 0 ; }")?;
-    nft("add rule inet f in iifname space drop")?;
-    nft("add rule inet f out oifname space drop")?;
+    nft("add rule inet f in iifname ground drop")?;
+    nft("add rule inet f out oifname ground drop")?;
     let began = now();
     let tasks = || std::fs::read_to_string(out.join("tasks.jsonl")).map(|text| text.lines().count());
     let before = tasks()?;
