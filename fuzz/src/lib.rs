@@ -56,7 +56,7 @@ pub fn faults(bytes: &[u8]) {
     if plan.validate(horizon, period).is_err() {
         return;
     }
-    let plan = plan.resolved(7, horizon, period);
+    let plan = plan.resolved(7, bytes.len() % 2 == 1, horizon, period);
     assert_eq!(plan.validate(horizon, period), Ok(()));
     let scheduled = plan.scheduled(period);
     assert!(scheduled.iter().all(|it| it.from < it.until), "{scheduled:?}");

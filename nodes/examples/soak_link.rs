@@ -29,6 +29,8 @@ const STATIONS: [(&str, &str); 3] = [
     ("\"puertollano\", \"awarua\", \"punta-arenas\"", "10"),
     ("\"boulder\", \"merritt\", \"singapore\", \"weilheim\", \"santiago\", \"dongara\", \"hawaii\"", "8"),
 ];
+/// Nodes that are killed every few seconds are not given up.
+const KILLED_OFTEN: &str = "[supervision]\nstarts = 1000\nbackoff_max_s = 0.5";
 const VICTIMS: [&str; 3] = ["swath-link", "swath-catalogue", "swath-requests"];
 
 fn main() -> Result<()> {
@@ -46,7 +48,7 @@ fn measure(seeds: std::ops::Range<u64>) -> Result<Value> {
                 let mission = folder.path().join("mission.toml");
                 let link =
                     format!("[link]\nstations = [{stations}]\nstrip_bits = 50e6\nuplink_bps = 16e3\nloss = {loss}");
-                std::fs::write(&mission, format!("[requests.random]\ncount = [1500, 1500]\n{link}\n"))?;
+                std::fs::write(&mission, format!("[requests.random]\ncount = [1500, 1500]\n{link}\n{KILLED_OFTEN}\n"))?;
                 let words = ["--seed", &seed.to_string(), "--orbits", orbits, "--planner", "lookahead", "--no-bag"];
                 let out = |kind: &str| folder.path().join(format!("{seed}-{number}-{loss}-{kind}"));
                 let alone = [&words[..], &["--in-process"]].concat();

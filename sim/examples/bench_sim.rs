@@ -10,7 +10,7 @@ use swath_sim::config::SimConfig;
 use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
 use swath_sim::learn::observation::ObservationSet;
-use swath_sim::planner::{Beam, Heuristic, Lookahead, Planner};
+use swath_sim::planner::{Beam, Frugal, Heuristic, Lookahead, Planner};
 use swath_sim::requests::catalogue::Catalogue;
 use swath_sim::requests::scenario::ScenarioConfig;
 use swath_sim::rng;
@@ -35,11 +35,13 @@ fn main() -> Result<()> {
         serde_json::json!({
             "closed_loop_ticks_per_s": closed_loop(&model)?,
             "closed_loop_resources_ticks_per_s": closed_loop(&with_resources()?)?,
-            "decision_steps_per_s": decision_steps(&model)?,
+            "decision_steps_per_s": decision_steps(&model, ObservationSet::Table1)?,
+            "decision_resources_steps_per_s": decision_steps(&with_resources()?, ObservationSet::Resources)?,
             "windows_5000x24h_s": windows(&model, &day),
             "window_one_strip_ms": one_window(&model, &day[0]),
             "lookahead_p99_ms": decision_p99(&model, &mut Lookahead::default())?,
             "beam_p99_ms": decision_p99(&model, &mut Beam::default())?,
+            "frugal_p99_ms": decision_p99(&with_resources()?, &mut Frugal::default())?,
         })
     );
     Ok(())
@@ -81,11 +83,10 @@ fn closed_loop(model: &Arc<Model>) -> Result<f64> {
 }
 
 /// Environment steps with 5000 strips, N = 40, the observation written each time.
-fn decision_steps(model: &Arc<Model>) -> Result<f64> {
+fn decision_steps(model: &Arc<Model>, set: ObservationSet) -> Result<f64> {
     let scenario = ScenarioConfig { count: [5000, 5000], ..ScenarioConfig::default() };
     let config = EpisodeConfig { orbits: 15.0, scenario, ..EpisodeConfig::default() };
     let mut planner = Heuristic { t_pre_s: 80.0 };
-    let set = ObservationSet::Table1;
     let mut features = vec![0.0; 40 * set.features()];
     let mut mask = vec![false; 40];
     let mut rates = Vec::new();
@@ -112,7 +113,7 @@ fn decision_p99(model: &Arc<Model>, planner: &mut dyn Planner) -> Result<f64> {
     let mut times = Vec::new();
     while !env.truncated() {
         let started = Instant::now();
-        let decision = planner.decide(&env.context())?;
+        let decision = env.decide(planner)?;
         times.push(started.elapsed().as_secs_f64() * 1e3);
         env.step(decision)?;
     }

@@ -2,17 +2,15 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
-use crate::planner::{Decision, DecisionContext, Planner, PlannerError, Shield};
+use crate::planner::{Decision, DecisionContext, Planner, PlannerError, Shield, decide};
 use crate::requests::catalogue::Candidate;
-use crate::task::{Duty, SettledTask, TaskRecord};
+use crate::task::{SettledTask, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::executive::Executive;
 use crate::vehicle::flight::{Flight, Situation};
 use crate::vehicle::health::Health;
 use crate::vehicle::model::Model;
-use crate::vehicle::resources::{Failure, Onboard};
+use crate::vehicle::resources::{Delivered, Failure, Onboard};
 
 /// Whoever keeps the requests of a mission.
 pub trait RequestKeeper {
@@ -21,17 +19,6 @@ pub trait RequestKeeper {
 
     /// A task has ended: says its reward.
     fn settle(&mut self, record: &TaskRecord) -> f64;
-}
-
-/// Images that came to the ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Delivered {
-    /// How many.
-    pub strips: u64,
-    /// Sum of the priorities of the strips that they fulfilled.
-    pub reward: f64,
-    /// Times that the battery was empty or a wheel over its limit when a task ended in which neither was before.
-    pub failures: u64,
 }
 
 /// A satellite, whoever keeps its requests, and a clock.
@@ -47,33 +34,24 @@ pub struct Mission<K> {
     candidates: Vec<Candidate>,
     /// Time from a situation to the start of the task decided on it [ticks].
     planning_delay: u32,
-    delivered: Delivered,
     shield: Option<Shield>,
-    /// What failed and is not mended yet.
-    safe_mode: Option<Failure>,
 }
 
 impl<K: RequestKeeper> Mission<K> {
     /// A mission that begins where a flight stands and ends at `horizon`.
     #[must_use]
-    pub fn new(model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
+    pub fn new(model: Arc<Model>, flight: Flight, keeper: K, horizon: Tick) -> Self {
+        Self::from_task(0, model, flight, keeper, horizon)
+    }
+
+    /// The same from the decision of a task's number on.
+    #[must_use]
+    pub fn from_task(task: u64, model: Arc<Model>, mut flight: Flight, keeper: K, horizon: Tick) -> Self {
         let situation = flight.situation();
-        let (task, previous, candidates) = (0, None, Vec::new());
+        let (previous, candidates) = (None, Vec::new());
         let shield = Shield::new(&model);
-        let mut mission = Self {
-            model,
-            flight,
-            keeper,
-            horizon,
-            task,
-            situation,
-            previous,
-            candidates,
-            planning_delay: 0,
-            delivered: Delivered::default(),
-            shield,
-            safe_mode: None,
-        };
+        let mut mission =
+            Self { model, flight, keeper, horizon, task, situation, previous, candidates, planning_delay: 0, shield };
         mission.refresh();
         mission
     }
@@ -151,13 +129,13 @@ impl<K: RequestKeeper> Mission<K> {
     /// What came to the ground so far.
     #[must_use]
     pub fn delivered(&self) -> &Delivered {
-        &self.delivered
+        self.onboard().map_or(&Delivered::NONE, |onboard| &onboard.state().delivered)
     }
 
     /// What failed and is not mended yet: until it is, the satellite only sees to that.
     #[must_use]
     pub fn safe_mode(&self) -> Option<Failure> {
-        self.safe_mode
+        self.onboard()?.state().safe_mode
     }
 
     /// Power, data and momentum, where they have bounds.
@@ -222,7 +200,6 @@ impl<K: RequestKeeper> Mission<K> {
 
     fn settled(&mut self, record: TaskRecord) -> SettledTask {
         let reward = self.keeper.settle(&record);
-        self.settle_resources(&record, reward);
         self.task += 1;
         self.previous = Some(record.clone());
         self.refresh();
@@ -246,15 +223,7 @@ impl<K: RequestKeeper> Mission<K> {
     /// # Errors
     /// When the planner gave no usable decision.
     pub fn decide(&self, planner: &mut dyn Planner) -> Result<Decision, PlannerError> {
-        if let Some(decision) = self.safe_decision() {
-            return Ok(decision);
-        }
-        let context = self.context();
-        let Some(shield) = &self.shield else { return planner.decide(&context) };
-        match shield.before(&context) {
-            Some(decision) => Ok(decision),
-            None => Ok(shield.check(&context, planner.decide(&context)?)),
-        }
+        decide(self.shield.as_ref(), &self.context(), planner)
     }
 
     /// Decides and flies to the mission's end, handing each task to `each`.
@@ -268,47 +237,11 @@ impl<K: RequestKeeper> Mission<K> {
         Ok(())
     }
 
-    /// Keeps or throws away what was imaged, and counts what came down and what failed in a task.
-    fn settle_resources(&mut self, record: &TaskRecord, reward: f64) {
-        let momentum = self.flight.spacecraft.body.wheel_speed.amax() * self.model.plant.wheels.inertia;
-        let Some(onboard) = self.flight.spacecraft.onboard_mut() else { return };
-        if record.strip.is_some() {
-            onboard.settle_image(if record.success() { reward } else { 0.0 });
-        }
-        for file in onboard.take_delivered() {
-            self.delivered.strips += 1;
-            self.delivered.reward += file.worth;
-        }
-        let config = onboard.config();
-        let mended = onboard.battery().level() >= config.battery_floor && momentum <= config.wheel_momentum_max_nms;
-        // The tick at which a task begins belongs to the one before it.
-        let failed = onboard.state().failure.filter(|(tick, _)| *tick > record.start);
-        let long_ago = onboard.state().failure.is_none_or(|(tick, _)| tick < record.end);
-        if let Some((_, failure)) = failed {
-            self.delivered.failures += u64::from(self.safe_mode.is_none());
-            self.safe_mode = Some(failure);
-        }
-        if mended && long_ago {
-            self.safe_mode = None;
-        }
-    }
-
-    /// What safe mode does next; nothing while all is well.
-    fn safe_decision(&self) -> Option<Decision> {
-        let failure = self.safe_mode?;
-        let thrusters = self.onboard().is_some_and(Onboard::has_thrusters);
-        let duty = if failure == Failure::WheelMomentum && thrusters { Duty::Desaturate } else { Duty::Charge };
-        Some(Decision::Serve { duty, ticks: self.model.period.ticks_ceil(SAFE_MODE_S).max(1) })
-    }
-
     fn refresh(&mut self) {
         self.situation = self.flight.situation();
         self.keeper.offer(self.task, &self.situation, &mut self.candidates);
     }
 }
-
-/// How long safe mode sees to a failure before it looks again [s].
-const SAFE_MODE_S: f64 = 60.0;
 
 /// How far past the mission's end windows are sought [orbits], so that its end cannot be seen in the observation.
 const WINDOW_MARGIN_ORBITS: f64 = 1.5;

@@ -65,6 +65,15 @@ impl Task {
             Self::Wait { .. } | Self::Serve { .. } => None,
         }
     }
+
+    /// What it does for the satellite itself; `None` for an image or a wait.
+    #[must_use]
+    pub fn duty(&self) -> Option<Duty> {
+        match *self {
+            Self::Serve { duty, .. } => Some(duty),
+            Self::Image { .. } | Self::Wait { .. } => None,
+        }
+    }
 }
 
 /// Why a task brought no image.
@@ -107,6 +116,8 @@ pub struct TaskRecord {
     pub end: Tick,
     /// The strip, or `None` for a task without one.
     pub strip: Option<StripId>,
+    /// What was done instead, or `None` for an image or a wait.
+    pub duty: Option<Duty>,
     /// Transition time T_pre [ticks]; 0 for a wait.
     pub t_pre: u32,
     /// Acquisition time T_acq [ticks]; 0 for a wait.
@@ -123,7 +134,7 @@ impl TaskRecord {
             Task::Image { t_pre, t_acq, .. } => (t_pre, t_acq),
             Task::Wait { .. } | Task::Serve { .. } => (0, 0),
         };
-        Self { task: number, start, end, strip: task.strip(), t_pre, t_acq, outcome }
+        Self { task: number, start, end, strip: task.strip(), duty: task.duty(), t_pre, t_acq, outcome }
     }
 
     /// Whether a strip was imaged.

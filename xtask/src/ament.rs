@@ -19,6 +19,7 @@ const PROGRAMS: &[&str] = &[
     "swath-link",
     "swath-planner",
     "swath-requests",
+    "swath-requests-learned",
     "swath-spacecraft",
 ];
 

@@ -36,6 +36,7 @@ fn type_hashes_are_those_of_ros_2() {
         ("service_msgs/msg/ServiceEventInfo", "41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"),
         ("tf2_msgs/msg/TFMessage", "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"),
         ("sensor_msgs/msg/NavSatFix", "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"),
+        ("sensor_msgs/msg/BatteryState", "4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741"),
         ("sensor_msgs/msg/JointState", "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"),
         ("diagnostic_msgs/msg/DiagnosticArray", "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"),
         ("lifecycle_msgs/msg/State", "dd2d02b82f3ebc858e53c431b1e6e91f3ffc71436fc81d0715214ac6ee2107a0"),
@@ -45,9 +46,11 @@ fn type_hashes_are_those_of_ros_2() {
             "c5f1cd4bb1ad2ba0e3329d4ac7015c52a674a72c1faf7974c37a33f4f6048b28",
         ),
         // Ours, as PyPI `rosbags` computes them from the same files.
-        ("swath_msgs/msg/SpacecraftState", "16783b07aaee856ca0c4713fb390a58816887ca775c80800644e7d6539b6fee4"),
-        ("swath_msgs/msg/WheelTorque", "7fe6a49598a7850b3e16f4f679a54ff8c430bddf50c8b4d4dcb8894f6a57d034"),
-        ("swath_msgs/msg/DecisionPoint", "5762f4ee32af8953e3d20ad8ef6f9748371c44138f43483ce30673747e9c362d"),
+        ("swath_msgs/msg/Activity", "c164712359937c3ab6cc65a776db223ed2d5931270fb0f55fadfdaf6d395ebc6"),
+        ("swath_msgs/msg/ResourceState", "0bc5f0af7799b0da55dbe586b89ced166d9a231d4d06e006c0e89e97b18677d3"),
+        ("swath_msgs/msg/SpacecraftState", "b3c8ea426bb6a2a03cb18783bb8f78a7cbbb840432c23bb528c60a0dd0a95d21"),
+        ("swath_msgs/msg/WheelTorque", "ca7578161bb3dca5662b2282469f9254d5ead42e57ab993a2e8691adb2de295b"),
+        ("swath_msgs/msg/DecisionPoint", "1fb85392e11262746c1bb21d49a785718f78e85b0a6881a7bc80a9df22ac68d0"),
         ("swath_msgs/msg/StripReport", "c258448b77b7a230a9c5f0ce6ea791529830dd879ea121f32c2dc172ff2582e0"),
         ("swath_msgs/msg/PlannerStatus", "693426a82532062a8b00ee5e42990f5cf4ae24c3595d168cefbb1cc1fc42e501"),
         ("swath_msgs/msg/Decision", "6cf2e48f3726d92af6cb2751a1f9f66fc0e245b7cf45938fba0eeedc9f0e6219"),
@@ -59,7 +62,8 @@ fn type_hashes_are_those_of_ros_2() {
         ("swath_msgs/msg/CatalogueHeard", "c65b2c6553479c4c9a2f76cbf73a55ca122911fb83e26deeac5d0a3bb20b78d2"),
         ("swath_msgs/msg/GuidanceReached", "c8d07605150eb9370beaeb5485879bf9a913b7efc0ec53d0a23883df4ab10dd9"),
         ("swath_msgs/msg/LinkStatus", "13dd719b2832603116f9dfc6e4be46de48c1f6400cbfc463ca43c241425356d4"),
-        ("swath_msgs/msg/StripWay", "f9e517e537390d35fc1d46ad9a4b77c3541255f0d3f0de65e29a4c80f03202f8"),
+        ("swath_msgs/msg/PredictedPlan", "3b075fa6869b637ea775570c6668f3ab299e41f23344635d0ce430be40abbf20"),
+        ("swath_msgs/msg/StripWay", "e94987f3a20918abc68b5e7e48ce9d9386199e617680be417775d2873d335b08"),
     ] {
         assert_eq!(type_hash_for(type_name), Some(format!("RIHS01_{hash}").as_str()), "{type_name}");
     }
@@ -146,6 +150,7 @@ fn state_has_the_bytes_that_cdr_prescribes() {
         omega_bn_b: vector(10.0),
         wheel_speed: [13.0, 14.0, 15.0],
         wheel_torque: [16.0, 17.0, 18.0],
+        resources: Vec::new(),
     };
     let mut expected = Vec::new();
     expected.extend(7_i32.to_le_bytes());
@@ -156,6 +161,8 @@ fn state_has_the_bytes_that_cdr_prescribes() {
     for value in 1..=18_u8 {
         expected.extend(f64::from(value).to_le_bytes());
     }
+    // No resources.
+    expected.extend(0_u32.to_le_bytes());
     assert_eq!(cdr(&state), expected);
     round_trip(&state);
 }

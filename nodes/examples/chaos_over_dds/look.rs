@@ -124,6 +124,7 @@ pub fn check_alarms(file: &Path, out: &Path) -> Result<()> {
         let name = match it.what {
             What::Process(process, _) => format!("{} lost", process.name()),
             What::Drop(_) => "messages dropped".to_owned(),
+            What::FramesLost(_) => "frames lost".to_owned(),
             What::StoreFull => "store full".to_owned(),
             What::BagFull => "bag full".to_owned(),
             What::Vehicle(_) => continue,

@@ -9,6 +9,8 @@ use swath_sim::rng;
 
 /// Most faults that are drawn for a mission, besides those of spacecraft and recorder.
 const FAULTS: u64 = 5;
+/// The radio of missions that have one.
+const LINK: &str = "[link]\nmode = \"always\"\nprocessing_s = 2.0\nloss = 0.1\nstrip_bits = 50e6\n";
 /// Length of a mission [orbits].
 const ORBITS: f64 = 0.2;
 
@@ -26,8 +28,11 @@ pub fn is_recorded(mission: &Mission) -> bool {
 /// The file of a seed's mission, and its faults.
 pub fn over_dds(seed: u64) -> Result<(String, Vec<PlannedFault>)> {
     let planner = ["lookahead", "heuristic:90", "beam"][(seed / 2 % 3) as usize];
-    let head =
-        format!("orbits = {ORBITS}\nseed = {seed}\nplanner = \"{planner}\"\n[requests.random]\ncount = [600, 600]\n");
+    // A third flies over a radio.
+    let link = if seed % 3 == 2 { LINK } else { "" };
+    let head = format!(
+        "orbits = {ORBITS}\nseed = {seed}\nplanner = \"{planner}\"\n[requests.random]\ncount = [600, 600]\n{link}"
+    );
     let random = 1 + seed % FAULTS;
     let drawn: Mission = toml::from_str(&format!("{head}[faults]\nrandom = {random}\n"))?;
     let model = drawn.model()?;

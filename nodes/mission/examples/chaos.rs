@@ -66,9 +66,15 @@ struct Flown {
 fn mission(seed: u64) -> Result<Mission> {
     let noise = seed.is_multiple_of(3);
     let plant = if noise { "[plant]\nattitude_noise_rad = 2e-4\nrate_noise_rad_s = 6e-5\n" } else { "" };
+    // A quarter flies over a radio.
+    let link = if seed % 4 == 3 {
+        "[link]\nmode = \"always\"\nprocessing_s = 2.0\nloss = 0.1\nstrip_bits = 50e6\n"
+    } else {
+        ""
+    };
     let random = 1 + seed % FAULTS;
     let text = format!(
-        "orbits = 0.25\nseed = {seed}\n[requests.random]\ncount = [800, 800]\n{plant}[faults]\nrandom = {random}\n"
+        "orbits = 0.25\nseed = {seed}\n[requests.random]\ncount = [800, 800]\n{plant}{link}[faults]\nrandom = {random}\n"
     );
     let mission: Mission = toml::from_str(&text).context("the mission is not valid")?;
     let mission = mission.resolved();
@@ -175,6 +181,7 @@ fn check_alarm(scheduled: &Scheduled, flown: &Flown, horizon: Tick) -> Result<()
     let name = match scheduled.what {
         What::Process(process, _) => format!("{} lost", process.name()),
         What::Drop(_) => "messages dropped".to_owned(),
+        What::FramesLost(_) => "frames lost".to_owned(),
         What::StoreFull => "store full".to_owned(),
         What::BagFull => "bag full".to_owned(),
         // A wheel shows when it is asked for torque, a bias when it stands out of the noise.

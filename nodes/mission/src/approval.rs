@@ -308,8 +308,16 @@ impl Planner for GatedPlanner {
         self.planner.minds_wheels()
     }
 
+    fn minds_resources(&self) -> bool {
+        self.planner.minds_resources()
+    }
+
     fn rationale(&self) -> Option<Rationale> {
         self.planner.rationale()
+    }
+
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(Self { gate: self.gate.clone(), planner: self.planner.doubled()? }))
     }
 }
 

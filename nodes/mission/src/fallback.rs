@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use swath_sim::config::SimConfig;
 use swath_sim::planner::{
     Decision, DecisionContext, Heuristic, Lookahead, Planner, PlannerError, PlannerSpec, Rationale,
@@ -24,6 +24,16 @@ pub struct Policies {
 }
 
 impl Policies {
+    /// No learned policies: hand-written planners only.
+    pub const HAND_WRITTEN: Self = Self {
+        make: |spec, seed| {
+            spec.hand_written(seed).with_context(|| format!("{spec} is a policy, which this program lacks"))
+        },
+        digest: |_| Ok(None),
+        other_satellite: |_, _| Ok(None),
+        revision: "",
+    };
+
     /// What an operator is told of a planner before it flies a satellite. That its policy cannot be read is told where
     /// it is made.
     #[must_use]
@@ -96,6 +106,23 @@ impl GuardedPlanner {
         Self { planner: Some(planner), degraded, degraded_decided: false, fault, missing, deciders }
     }
 
+    /// Another one that goes on from here as this one would; none where its planner cannot be doubled.
+    #[must_use]
+    pub fn doubled(&self) -> Option<Self> {
+        let planner = match &self.planner {
+            Some(planner) => Some(planner.fork()?),
+            None => None,
+        };
+        Some(Self {
+            planner,
+            degraded: self.degraded.clone(),
+            degraded_decided: self.degraded_decided,
+            fault: self.fault.clone(),
+            missing: self.missing.clone(),
+            deciders: self.deciders.clone(),
+        })
+    }
+
     /// Why there is no planner but the heuristic.
     #[must_use]
     pub fn missing(&self) -> Option<&str> {
@@ -162,6 +189,14 @@ impl Planner for GuardedPlanner {
 
     fn minds_wheels(&self) -> bool {
         true
+    }
+
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.doubled()?))
+    }
+
+    fn minds_resources(&self) -> bool {
+        self.planner.as_ref().is_some_and(|planner| planner.minds_resources())
     }
 
     fn rationale(&self) -> Option<Rationale> {

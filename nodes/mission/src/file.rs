@@ -291,6 +291,9 @@ impl Mission {
         if !self.faults.is_empty() {
             let model = self.model()?;
             self.faults.validate(self.horizon(&model), model.period)?;
+            if self.link.is_none() {
+                self.faults.fits_no_radio()?;
+            }
             self.nodes.fits(&self.faults)?;
         }
         Ok(())
@@ -302,7 +305,7 @@ impl Mission {
         self.initial = Some(self.initial());
         if let Ok(model) = self.model() {
             let horizon = self.horizon(&model);
-            self.faults = self.faults.resolved(self.seed, horizon, model.period);
+            self.faults = self.faults.resolved(self.seed, self.link.is_some(), horizon, model.period);
         }
         self
     }

@@ -4,23 +4,24 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::mission::Mission as Loop;
-use swath_sim::planner::{Decision, DecisionContext, Planner, PlannerError};
+use swath_sim::planner::{Decision, DecisionContext, Nobody, Planner, PlannerError};
 use swath_sim::task::{SettledTask, Task};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::executive::Executive;
-use swath_sim::vehicle::flight::Flight;
+use swath_sim::vehicle::flight::{Flight, Situation};
 use swath_sim::vehicle::model::Model;
 use thiserror::Error;
 
 use crate::absences::{Absences, Presence};
 use crate::alarms::Board;
-use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, report_all};
+use crate::alarms::conditions::{Report, back, of_ground, of_health, of_plan, of_planner, of_resources, report_all};
 use crate::faults::grammar::Process;
 use crate::file::{Mission, MissionError};
 use crate::keeper::Keeper;
 use crate::link::apart::Apart;
 use crate::link::ground::WayLine;
 use crate::link::response::LinkSummary;
+use crate::link::told::Told;
 use crate::orders::action::Action;
 use crate::outcome::{ResourcesSummary, TaskLine};
 use crate::requests::journal::InFlight;
@@ -39,6 +40,7 @@ pub enum InProcessError {
 }
 
 /// A mission ready to be flown in this process: the loop of the simulation around the request manager of the nodes.
+#[derive(Clone)]
 pub struct InProcessMission {
     mission: Loop<Keeper>,
     requested: usize,
@@ -46,6 +48,8 @@ pub struct InProcessMission {
     board: Board,
     /// What is still to be reported of faults by order.
     to_report: VecDeque<Report>,
+    /// What is still to be reported of power, data and momentum.
+    of_resources: Vec<Report>,
 }
 
 impl InProcessMission {
@@ -62,6 +66,18 @@ impl InProcessMission {
     /// # Errors
     /// When a setting is out of range or a file of requests cannot be used.
     pub fn with_actions(mission: &Mission, actions: Vec<Action>) -> Result<Self, InProcessError> {
+        let mut flight = Self::watched(mission, actions)?;
+        if let Keeper::Apart(apart) = flight.mission.keeper_mut() {
+            apart.forget_told();
+        }
+        Ok(flight)
+    }
+
+    /// The same, of which [`Self::take_told`] tells what the ground was told, in a mission with `[link]`.
+    ///
+    /// # Errors
+    /// When a setting is out of range or a file of requests cannot be used.
+    pub fn watched(mission: &Mission, actions: Vec<Action>) -> Result<Self, InProcessError> {
         mission.faults.fits_one_process().map_err(MissionError::from)?;
         let model = Arc::new(mission.model()?);
         let horizon = mission.horizon(&model);
@@ -77,7 +93,60 @@ impl InProcessMission {
         let to_report = of_plan(&mission.faults, model.period).into();
         let mut mission = Loop::new(model, flight, keeper, horizon);
         mission.set_planning_delay(delay);
-        Ok(Self { mission, requested, faults, board, to_report })
+        Ok(Self { mission, requested, faults, board, to_report, of_resources: Vec::new() })
+    }
+
+    /// One that goes on at the decision of a task, from what is known of the satellite there.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub(crate) fn resumed(
+        mission: &Mission,
+        task: u64,
+        situation: &Situation,
+        apart: Apart,
+    ) -> Result<Self, InProcessError> {
+        let mut fresh = Self::new(mission)?;
+        let (model, horizon) = (Arc::clone(fresh.model()), fresh.horizon());
+        let mut flight = fresh.mission.flight().clone();
+        flight.resume(&model, situation);
+        let delay = fresh.mission.planning_delay();
+        fresh.mission = Loop::from_task(task, model, flight, Keeper::Apart(Box::new(apart)), horizon);
+        fresh.mission.set_planning_delay(delay);
+        Ok(fresh)
+    }
+
+    /// Something will be asked of the ground, after all that is still to come, in a mission with `[link]`.
+    pub(crate) fn will_be_asked(&mut self, action: Action) {
+        if let Keeper::Apart(apart) = self.mission.keeper_mut() {
+            apart.will_also_be_asked(action);
+        }
+    }
+
+    /// What the ground was told since the last call, where that is watched.
+    pub fn take_told(&mut self) -> Vec<Told> {
+        match self.mission.keeper_mut() {
+            Keeper::Together(_) => Vec::new(),
+            Keeper::Apart(apart) => apart.take_told(),
+        }
+    }
+
+    /// What the next decision rests on.
+    #[must_use]
+    pub fn context(&self) -> DecisionContext<'_> {
+        self.mission.context()
+    }
+
+    /// Tick at which the mission ends.
+    #[must_use]
+    pub fn horizon(&self) -> Tick {
+        self.mission.horizon()
+    }
+
+    /// Simulated time.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.mission.now()
     }
 
     /// The alarms.
@@ -134,11 +203,7 @@ impl InProcessMission {
     #[must_use]
     pub fn resources(&self) -> Option<ResourcesSummary> {
         let onboard = self.mission.onboard()?;
-        Some(ResourcesSummary {
-            delivered: *self.mission.delivered(),
-            battery_level: onboard.battery().level(),
-            stored_bits: onboard.storage().stored(),
-        })
+        Some(ResourcesSummary::new(onboard.state()))
     }
 
     /// How long orders took over the radio, in a mission with `[link]`.
@@ -176,6 +241,7 @@ impl InProcessMission {
             let executive = self.fresh_executive();
             self.mission.without_guidance(back.min(self.mission.horizon()), executive);
         }
+        self.to_report_of_resources();
         if self.mission.over() {
             self.report(None);
             return Ok(None);
@@ -229,6 +295,15 @@ impl InProcessMission {
         Executive::watching(self.mission.model(), self.faults.noisy)
     }
 
+    /// What is to be told of power, data and momentum, as they stand at a decision.
+    fn to_report_of_resources(&mut self) {
+        let situation = self.mission.context().situation;
+        let (now, state) = (situation.now, situation.resources);
+        let told = state.iter().zip(&self.mission.model().config.resources);
+        let reports = told.flat_map(|(state, config)| of_resources(now, state, config)).collect::<Vec<_>>();
+        self.of_resources.extend(reports);
+    }
+
     /// Tells the board what happened up to now, and what the planner says of its decision.
     fn report(&mut self, planner: Option<Report>) {
         let now = self.mission.now();
@@ -237,26 +312,12 @@ impl InProcessMission {
         while let Some(report) = self.to_report.pop_front_if(|report| report.tick <= now) {
             reports.push(report);
         }
+        reports.append(&mut self.of_resources);
         reports.extend(planner);
         let space = self.link().map(Apart::space);
         reports.extend(space.map(|space| of_ground(now, space.heard(), space.command_lost(now))));
         report_all(&mut self.board, reports, &[]);
         self.board.advance(now);
-    }
-}
-
-/// Decides in the place of a planner that is away: the attitude is held.
-struct Nobody {
-    ticks: u32,
-}
-
-impl Planner for Nobody {
-    fn name(&self) -> String {
-        "nobody".to_owned()
-    }
-
-    fn decide(&mut self, _: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
-        Ok(Decision::Wait { ticks: self.ticks })
     }
 }
 

@@ -131,14 +131,14 @@ impl Keeper {
             return Ok(Self::Together(Box::new(desk)));
         };
         let (up, down) = radio.rates();
-        let mut ground = Ground::new(requests.clone(), up);
+        let ground = Ground::new(requests.clone(), up);
+        let space = Catalogue::new(requests, down, radio.config(), model.period);
+        let mut apart = Apart::new(ground, space, radio);
         for order in initial {
             let act = Act::Submit(StripId(0), Box::new(order));
             let (actor, reason) = (MISSION.to_owned(), String::new());
-            _ = ground.ask(Action { at: Tick(0), initial: true, actor, reason, act }, Tick(0));
+            apart.ask_first(Action { at: Tick(0), initial: true, actor, reason, act });
         }
-        let space = Catalogue::new(requests, down, radio.config(), model.period);
-        let mut apart = Apart::new(ground, space, radio);
         apart.will_be_asked(actions, absences);
         Ok(Self::Apart(Box::new(apart)))
     }

@@ -11,6 +11,7 @@ pub mod file;
 pub mod in_process;
 mod keeper;
 pub mod link;
+pub mod mirror;
 pub mod orders;
 pub mod origin;
 pub mod outcome;

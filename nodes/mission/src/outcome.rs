@@ -1,9 +1,9 @@
 //! What a mission leaves behind beside its bag: a line a task, and a summary.
 
 use serde::{Deserialize, Serialize};
-use swath_sim::mission::Delivered;
-use swath_sim::task::{FailureReason, SettledTask, TaskOutcome, TaskRecord, Totals};
+use swath_sim::task::{Duty, FailureReason, SettledTask, TaskOutcome, TaskRecord, Totals};
 use swath_sim::time::{Tick, TickPeriod};
+use swath_sim::vehicle::resources::{Delivered, ResourceState};
 use swath_sim::world::strip::StripId;
 
 use crate::fallback::Deciders;
@@ -25,6 +25,9 @@ pub struct TaskLine {
     pub strip: Option<u64>,
     /// Name of the strip; absent for a wait.
     pub name: Option<String>,
+    /// What was done instead, in a mission with `[resources]`; absent for an image or a wait.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub duty: Option<Duty>,
     /// Transition time T_pre [ticks].
     pub t_pre_ticks: u32,
     /// Acquisition time T_acq [ticks].
@@ -52,6 +55,7 @@ impl TaskLine {
             end_tick: record.end.0,
             strip: record.strip.map(|id| id.0),
             name: name.map(str::to_owned),
+            duty: record.duty,
             t_pre_ticks: record.t_pre,
             t_acq_ticks: record.t_acq,
             success: record.success(),
@@ -75,6 +79,7 @@ impl TaskLine {
             start: Tick(self.start_tick),
             end: Tick(self.end_tick),
             strip: self.strip.map(StripId),
+            duty: self.duty,
             t_pre: self.t_pre_ticks,
             t_acq: self.t_acq_ticks,
             outcome,
@@ -180,6 +185,14 @@ pub struct ResourcesSummary {
     pub stored_bits: u64,
 }
 
+impl ResourcesSummary {
+    /// The summary of how power and data stand at a mission's end.
+    #[must_use]
+    pub fn new(state: &ResourceState) -> Self {
+        Self { delivered: state.delivered, battery_level: state.level(), stored_bits: state.stored_bits }
+    }
+}
+
 /// What a summary takes from outside the totals.
 #[derive(Clone, Debug, Default)]
 pub struct SummaryInputs {
@@ -273,6 +286,7 @@ impl Summary {
                 ("strips delivered", delivered.strips.to_string()),
                 ("delivered reward", format!("{:.2}", delivered.reward)),
                 ("failures", delivered.failures.to_string()),
+                ("below the floor", format!("{} times", delivered.floor_violations)),
                 ("battery at the end", format!("{:.1} %", battery_level * 100.0)),
                 ("stored at the end", format!("{:.3} Gbit", *stored_bits as f64 / 1e9)),
             ]);

@@ -108,7 +108,7 @@ mod tests {
     fn record(task: u64, strip: Option<u64>) -> TaskRecord {
         let outcome = TaskOutcome { failure: None, max_attitude_error: 0.01, min_elevation: 1.0 };
         let (start, end) = (Tick(task * 10), Tick(task * 10 + 10));
-        TaskRecord { task, start, end, strip: strip.map(StripId), t_pre: 5, t_acq: 5, outcome }
+        TaskRecord { task, start, end, strip: strip.map(StripId), duty: None, t_pre: 5, t_acq: 5, outcome }
     }
 
     #[test]

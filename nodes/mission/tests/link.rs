@@ -218,3 +218,32 @@ fn a_ground_that_is_lost_and_comes_back_loses_and_doubles_nothing() {
     assert!(tasks.iter().filter(|it| it.record.success()).count() > 20);
     assert!(flight.ways().iter().all(|it| it.acknowledged_tick.is_some()));
 }
+
+#[test]
+fn frames_that_are_lost_by_order_cost_time_and_nothing_else() {
+    let mut mission = mission(6.0, 800, 1, &format!("stations = [{SEVEN}]\nuplink_bps = 4000"));
+    with_an_end(&mut mission, 4.0);
+    let (nominal, before) = flown(&mission, Vec::new());
+    mission.faults = toml::from_str("plan = [\"link:drop 80%@0s+6000s\"]").unwrap();
+    mission.validate().unwrap();
+    let (tasks, mut flight) = flown(&mission, Vec::new());
+    assert!(tasks != nominal, "it is felt");
+    assert_settled(&flight);
+    let lost = |flight: &InProcessMission| {
+        let link = flight.link().unwrap();
+        link.ground().counts().sent - link.space().counts().heard
+    };
+    assert!(lost(&before) < 20 && lost(&flight) > 50, "{} and {}", lost(&before), lost(&flight));
+    let journal = flight.board().take_journal();
+    assert!(journal.iter().any(|it| it.key.name == "frames lost" && it.tick == Tick(0)), "{journal:?}");
+    // Of nodes that are replaced at once, while the clock stands, nothing is felt.
+    mission.faults = toml::from_str("plan = [\"link:kill@900s\", \"catalogue:hang@1500s\"]").unwrap();
+    mission.validate().unwrap();
+    let (tasks, mut flight) = flown(&mission, Vec::new());
+    assert_eq!(tasks, nominal);
+    let names: Vec<_> = flight.board().take_journal().iter().map(|it| it.key.name.clone()).collect();
+    assert_eq!(names, ["link lost", "link lost", "catalogue lost", "catalogue lost"]);
+    mission.link = None;
+    let error = mission.validate().unwrap_err().to_string();
+    assert!(error.ends_with("link:kill@900s: the mission has no [link], so nothing of the radio can fail"), "{error}");
+}

@@ -9,13 +9,14 @@ use std::marker::PhantomData;
 use swath_msgs::diagnostic_msgs::DiagnosticArray;
 use swath_msgs::rcl_interfaces::{Log, ParameterEvent};
 use swath_msgs::rosgraph_msgs::Clock;
-use swath_msgs::sensor_msgs::{JointState, NavSatFix};
+use swath_msgs::sensor_msgs::{BatteryState, JointState, NavSatFix};
 use swath_msgs::swath_msgs::{
     AcknowledgeAlarm, AlarmEvent, CancelStrips, CatalogueHeard, Decision, DecisionPoint, FaultOrders, GetLimits,
     GetStrip, GuidanceReached, GuidanceStatus, ImagingTask, LinkStatus, ListAlarms, ListHistory, ListStrips, ListWays,
-    OperatorAction, OrderFault, PlannerStatus, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip, RequestSummary,
-    ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState, StandingAlarms, StripRequest,
-    StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm, UpcomingStrips, WheelTorque,
+    OperatorAction, OrderFault, PlannerStatus, PredictedPlan, PreviewStrip, RadioSent, RadioTurn, ReplaceStrip,
+    RequestSummary, ResourceState, ReviewProposal, ReviewStrips, SetPlannerMode, ShelveAlarm, SpacecraftState,
+    StandingAlarms, StripRequest, StripStatus, SubmitStrips, TaskAbort, TaskPhase, TaskResult, UnshelveAlarm,
+    UpcomingStrips, WheelTorque,
 };
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_msgs::{RosMessage, RosService};
@@ -202,6 +203,9 @@ pub const STRIP_EVENTS: Topic<StripStatus> =
 /// The radio, as the ground knows it.
 pub const LINK_STATUS: Topic<LinkStatus> =
     Topic::new("requests/link", Profile::Latched, &[REQUEST_MANAGER], &[OPERATOR]);
+/// What the satellite is going to do, as the ground predicts it.
+pub const PREDICTED_PLAN: Topic<PredictedPlan> =
+    Topic::new("requests/plan", Profile::Latched, &[REQUEST_MANAGER], &[OPERATOR]);
 /// What was asked for of the request manager and taken.
 pub const REQUEST_ACTIONS: Topic<OperatorAction> =
     Topic::new("requests/actions", Profile::Event, &[REQUEST_MANAGER], &[]);
@@ -227,6 +231,10 @@ pub const SUB_SATELLITE_POINT: Topic<NavSatFix> =
     Topic::new("spacecraft/sub_satellite_point", Profile::Event, &[SPACECRAFT], &[]);
 /// Speeds and torques of the wheels, decimated.
 pub const WHEELS: Topic<JointState> = Topic::new("spacecraft/wheels", Profile::Event, &[SPACECRAFT], &[]);
+/// Charge of the battery, decimated, in missions with `[resources]`.
+pub const BATTERY: Topic<BatteryState> = Topic::new("spacecraft/battery", Profile::Event, &[SPACECRAFT], &[]);
+/// Power, storage and momentum, decimated, in missions with `[resources]`.
+pub const RESOURCES: Topic<ResourceState> = Topic::new("spacecraft/resources", Profile::Event, &[SPACECRAFT], &[]);
 /// Frames, decimated.
 pub const TF: Topic<TFMessage> = Topic::new("/tf", Profile::Event, &[SPACECRAFT], &[]);
 /// Health of the nodes.
@@ -283,6 +291,8 @@ pub const TOPICS: &[Entry] = &[
     SPACECRAFT_TRUTH.entry,
     SUB_SATELLITE_POINT.entry,
     WHEELS.entry,
+    BATTERY.entry,
+    RESOURCES.entry,
     TF.entry,
     WHEEL_TORQUE.entry,
     DECISION_POINT.entry,
@@ -301,6 +311,7 @@ pub const TOPICS: &[Entry] = &[
     REQUEST_ACTIONS.entry,
     REQUEST_SUMMARY.entry,
     LINK_STATUS.entry,
+    PREDICTED_PLAN.entry,
     TASK_ABORT.entry,
     PLANNER_TASK.entry,
     PLANNER_DECISION.entry,
@@ -469,6 +480,7 @@ mod tests {
     request_manager -->|requests/summary| launcher
     request_manager -->|requests/summary| operator
     request_manager -->|requests/link| operator
+    request_manager -->|requests/plan| operator
     request_manager -->|requests/abort| guidance
     planner -->|planner/task| guidance
     planner -->|planner/task| request_manager

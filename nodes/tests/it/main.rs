@@ -31,6 +31,7 @@ mod readme;
 mod recorded;
 #[path = "../../examples/common/request.rs"]
 mod request;
+mod resources;
 mod start_and_end;
 mod storm;
 #[path = "../../ros/tests/it/stranger.rs"]

@@ -7,7 +7,7 @@ use crate::common;
 
 const MISSION: &str = "orbits = 1.0\n[requests.random]\ncount = [1500, 1500]\n";
 
-fn tasks(mission: &Path, out: &Path, words: &[&str]) -> String {
+pub fn tasks(mission: &Path, out: &Path, words: &[&str]) -> String {
     let domain = common::domain();
     let mut launch = common::command("swath", &domain);
     launch.arg("launch").arg(mission).arg("--out").arg(out).args(words);

@@ -15,6 +15,10 @@ const SEVEN: &str = "\"boulder\", \"merritt\", \"singapore\", \"weilheim\", \"sa
 /// What a mission over the radio leaves that must be the same wherever it is flown.
 const OUTPUTS: [&str; 3] = ["tasks.jsonl", "strips.jsonl", "alarms.jsonl"];
 
+/// A loss, and what of the radio fails by order.
+const FAILING: &str = "0.1\n[faults]\nplan = [\"link:drop 60%@600s+3000s\", \"link:kill@900s\", \"catalogue:kill@1500s\", \
+    \"link:hang@2000s\", \"catalogue:hang@2600s\"]";
+
 fn mission(folder: &Path, name: &str, text: &str) -> PathBuf {
     let path = folder.join(format!("{name}.toml"));
     std::fs::write(&path, format!("{text}[requests.random]\ncount = [800, 800]\n")).unwrap();
@@ -48,6 +52,7 @@ fn missions_over_the_radio_are_the_same_over_dds_in_one_process_and_flown_again(
         ("three", THREE, "3.0", "2", "0.0"),
         ("seven", SEVEN, "2.0", "3", "0.2"),
         ("silent", ONE, "7.0", "1", "0.0\ncommand_loss_h = 1.5"),
+        ("failing", SEVEN, "2.0", "3", FAILING),
     ] {
         let link = format!("[link]\nstations = [{stations}]\nstrip_bits = 50e6\nloss = {loss}\n");
         let mission = mission(folder.path(), name, &link);
@@ -61,6 +66,12 @@ fn missions_over_the_radio_are_the_same_over_dds_in_one_process_and_flown_again(
         }
         let silent = outputs(&out("dds"))[2].contains("ground silent");
         assert_eq!(silent, name == "silent", "{name}");
+        if name == "failing" {
+            for (alarm, times) in [("link lost", 4), ("catalogue lost", 4), ("frames lost", 2)] {
+                let told = lines(&out("dds"), "alarms.jsonl");
+                assert_eq!(told.iter().filter(|it| it["name"] == alarm).count(), times, "{alarm}: {told:?}");
+            }
+        }
         let summary = |kind: &str| -> Value {
             serde_json::from_str(&std::fs::read_to_string(out(kind).join("summary.json")).unwrap()).unwrap()
         };
@@ -114,6 +125,40 @@ fn a_peer_that_doubles_reorders_and_damages_what_is_sent_changes_nothing() {
     let said: Value = serde_json::from_str(&std::fs::read_to_string(&said).unwrap()).unwrap();
     assert!(said["sent"].as_u64().unwrap() > 1000, "{said}");
     assert!(said["heard"].as_object().unwrap().values().all(|count| count.as_u64().unwrap() > 10), "{said}");
+}
+
+#[test]
+fn the_ground_says_what_the_satellite_is_going_to_do_and_when_that_will_be_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = format!("[link]\nstations = [{THREE}]\nstrip_bits = 50e6\nprediction_h = 6.0\n");
+    let mission = mission(folder.path(), "foreseen", &link);
+    let (out, domain) = (folder.path().join("out"), common::domain());
+    let words = ["--planner", "lookahead", "--orbits", "12.0", "--seed", "2", "--no-bag"];
+    let mut launch = common::command("swath", &domain);
+    let mut flight = launch.arg("launch").arg(&mission).arg("--out").arg(&out).args(words).spawn().unwrap();
+    let ask = |words: &[&str]| {
+        let output = common::run(&mut common::swath(&domain, words));
+        output.status.success().then(|| serde_json::from_slice::<Value>(&output.stdout).unwrap())
+    };
+    let plan = common::until("a plan", || ask(&["link", "plan", "--json"]));
+    let tasks = plan["tasks"].as_array().unwrap();
+    assert!(tasks.len() > 10, "{plan}");
+    let last = tasks.iter().rfind(|task| task["success"] == true && !task["known_tick"].is_null()).unwrap();
+    let way = ask(&["strips", "show", &last["strip"].to_string(), "--json"]).unwrap()["way"].clone();
+    let step = |name: &str| {
+        [&way[name], &way["predicted"][name]].into_iter().find(|it| !it.is_null()).unwrap()["tick"].clone()
+    };
+    assert_eq!((&step("imaged"), &step("known")), (&last["end_tick"], &last["known_tick"]), "{way}");
+    assert!(flight.wait().unwrap().success());
+    let flown = lines(&out, "tasks.jsonl");
+    for task in tasks {
+        let flown = &flown[task["task"].as_u64().unwrap() as usize];
+        for name in ["strip", "start_tick", "end_tick"] {
+            assert_eq!(task[name], flown[name], "{task} and {flown}");
+        }
+        assert_eq!(task["success"].as_bool(), Some(flown["reason"].is_null()), "{task} and {flown}");
+    }
+    assert_eq!(plan["partings"], 0);
 }
 
 #[test]

@@ -34,6 +34,22 @@ pub struct Score {
     pub failed_attitude: Option<f64>,
     /// Share of the attempts that failed for elevation.
     pub failed_elevation: Option<f64>,
+    /// What came to the ground and what failed, where resources have bounds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resources: Option<ResourceScore>,
+}
+
+/// What came to the ground in a mission, and what failed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ResourceScore {
+    /// Sum of the priorities of strips whose images are on the ground, per orbit.
+    pub delivered_per_orbit: f64,
+    /// Images that are on the ground, per orbit.
+    pub strips_per_orbit: f64,
+    /// Times that the charge fell below the battery's floor.
+    pub floor_violations: u64,
+    /// Times that the battery was empty or a wheel over its limit.
+    pub failures: u64,
 }
 
 impl Score {
@@ -56,6 +72,15 @@ impl Score {
             wait_s_per_orbit: seconds(totals.wait_ticks) / orbits,
             failed_attitude: of_attempts(totals.failed_attitude as f64),
             failed_elevation: of_attempts(totals.failed_elevation as f64),
+            resources: env.onboard().map(|_| {
+                let delivered = env.delivered();
+                ResourceScore {
+                    delivered_per_orbit: delivered.reward / orbits,
+                    strips_per_orbit: delivered.strips as f64 / orbits,
+                    floor_violations: delivered.floor_violations,
+                    failures: delivered.failures,
+                }
+            }),
         }
     }
 }

@@ -142,8 +142,18 @@ pub trait Planner {
         false
     }
 
+    /// Whether it sees to data by itself, so that the shield sees to battery and momentum alone.
+    fn minds_resources(&self) -> bool {
+        false
+    }
+
     /// Why it decided as it last did; nothing from a planner that does not weigh candidates.
     fn rationale(&self) -> Option<Rationale> {
+        None
+    }
+
+    /// Another one that goes on from here as this one would; none from a planner that cannot be doubled.
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
         None
     }
 }

@@ -14,6 +14,10 @@ impl Planner for Heuristic {
         format!("heuristic:{}", self.t_pre_s)
     }
 
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         let t_pre = context.model.period.ticks_ceil(self.t_pre_s);
         let start = context.situation.now.after(t_pre);

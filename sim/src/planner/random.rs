@@ -19,6 +19,10 @@ impl Planner for Random {
         "random".to_owned()
     }
 
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
         if context.candidates.is_empty() {
             return Ok(wait(context, std::iter::empty()));

@@ -1,8 +1,9 @@
 //! A shield around any planner: it never lets the battery below its floor, and sees to momentum and downlink.
 
-use super::{Decision, DecisionContext};
+use super::{Decision, DecisionContext, Planner, PlannerError};
 use crate::task::Duty;
 use crate::vehicle::model::Model;
+use crate::vehicle::resources::Failure;
 use crate::world::sun::Sun;
 
 /// What a decision may cost, and what is done instead of one that costs too much.
@@ -38,6 +39,33 @@ const MOMENTUM_SHARE: f64 = 0.7;
 /// Length of a duty [s].
 const DUTY_S: f64 = 60.0;
 
+/// What comes next: safe mode decides, or the shield, or the planner within what the shield allows.
+///
+/// # Errors
+/// When the planner gave no usable decision.
+pub fn decide(
+    shield: Option<&Shield>,
+    context: &DecisionContext<'_>,
+    planner: &mut dyn Planner,
+) -> Result<Decision, PlannerError> {
+    if let Some(decision) = safe_decision(context) {
+        return Ok(decision);
+    }
+    let Some(shield) = shield else { return planner.decide(context) };
+    match shield.before(context, planner.minds_resources()) {
+        Some(decision) => Ok(decision),
+        None => Ok(shield.check(context, planner.decide(context)?)),
+    }
+}
+
+/// What safe mode does next: it sees to what failed, for a while, before it looks again. Nothing while all is well.
+fn safe_decision(context: &DecisionContext<'_>) -> Option<Decision> {
+    let failure = context.situation.resources?.safe_mode?;
+    let thrusters = context.model.config.resources.as_ref().is_some_and(|it| it.has_thrusters());
+    let duty = if failure == Failure::WheelMomentum && thrusters { Duty::Desaturate } else { Duty::Charge };
+    Some(Decision::Serve { duty, ticks: context.model.period.ticks_ceil(DUTY_S).max(1) })
+}
+
 impl Shield {
     /// The shield of a mission; none where resources have no bounds or it is switched off.
     #[must_use]
@@ -57,16 +85,17 @@ impl Shield {
         })
     }
 
-    /// What must be done before a planner is asked: momentum out of the wheels, data down while a station hears them.
+    /// What must be done before a planner is asked: momentum out of the wheels, and, where it does not see to that itself,
+    /// data down while a station hears them.
     #[must_use]
-    pub fn before(&self, context: &DecisionContext<'_>) -> Option<Decision> {
+    pub fn before(&self, context: &DecisionContext<'_>, minds_resources: bool) -> Option<Decision> {
         let resources = context.situation.resources?;
         let serve = |duty| Decision::Serve { duty, ticks: self.ticks };
         let momentum = context.situation.body.wheel_speed.amax() * context.model.plant.wheels.inertia;
         if self.thrusters && momentum > self.momentum_limit {
             return Some(self.check(context, serve(Duty::Desaturate)));
         }
-        let sends = self.antenna_needs_task && resources.in_contact && resources.to_send_bits > 0;
+        let sends = !minds_resources && self.antenna_needs_task && resources.in_contact && resources.to_send_bits > 0;
         sends.then(|| self.check(context, serve(Duty::Downlink)))
     }
 

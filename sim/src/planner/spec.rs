@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::decision::Planner;
+use super::frugal::Frugal;
+use super::handmade::Handmade;
 use super::heuristic::Heuristic;
 use super::lookahead::{Beam, BeamSearch, Lookahead};
 use super::random::Random;
@@ -28,6 +30,7 @@ const T_PRE_MAX_S: f64 = 600.0;
 const BUDGET_MAX: u64 = 100_000_000;
 
 /// A planner by name: `lookahead`, `lookahead:TICKS` for a margin that is not adapted, `beam`, `beam:WIDTHxDEPTH`,
+/// `frugal`, `beam+handmade:SHARE`,
 /// `repair` and `aspen`, each also with `-annealing` or `-squeaky` for another search, `repair:TICKS` for another budget,
 /// `heuristic:SECONDS`, `random`, or a kind of policy such as `hop-ppo` for the one that is part of the program and `hop-ppo:FILE` for another; with
 /// `hop-ppo+lookahead` its proposals are flown in the head.
@@ -38,6 +41,10 @@ pub enum PlannerSpec {
     Lookahead(Option<u32>),
     /// Flies sequences of candidates in its head.
     Beam(BeamSearch),
+    /// The same, paying for energy and data.
+    Frugal,
+    /// The beam search within a shield made by hand, with the least charge over capacity that it requires.
+    Handmade(f64),
     /// Repairs its plan on board all the time, as CASPER.
     Repair {
         /// How better plans are sought.
@@ -92,6 +99,11 @@ impl FromStr for PlannerSpec {
             ("beam", None) => Ok(Self::Beam(BeamSearch::default())),
             ("beam", Some(shape)) => beam(shape)
                 .ok_or_else(|| unknown("the beam must be WIDTHxDEPTH, with a width of 1 to 64 and a depth of 1 to 8")),
+            ("frugal", None) => Ok(Self::Frugal),
+            ("beam+handmade", Some(share)) => match share.parse() {
+                Ok(share) if (0.0..=1.0).contains(&share) => Ok(Self::Handmade(share)),
+                _ => Err(unknown("the least charge must be a share of the capacity from 0 to 1")),
+            },
             ("repair" | "repair-annealing" | "repair-squeaky", ticks) => match ticks.map(str::parse).transpose() {
                 Ok(ticks) if ticks.is_none_or(|ticks| (1..=BUDGET_MAX).contains(&ticks)) => {
                     Ok(Self::Repair { method: method(word), ticks })
@@ -156,6 +168,8 @@ impl fmt::Display for PlannerSpec {
             Self::Lookahead(Some(margin)) => write!(f, "lookahead:{margin}"),
             Self::Beam(beam) if *beam == BeamSearch::default() => write!(f, "beam"),
             Self::Beam(beam) => write!(f, "beam:{}x{}", beam.width, beam.depth),
+            Self::Frugal => write!(f, "frugal"),
+            Self::Handmade(share) => write!(f, "beam+handmade:{share}"),
             Self::Repair { method, ticks } => {
                 write!(f, "repair{}", method.ending())?;
                 ticks.map_or(Ok(()), |ticks| write!(f, ":{ticks}"))
@@ -178,6 +192,8 @@ impl PlannerSpec {
         match *self {
             Self::Lookahead(margin) => Some(Box::new(margin.map_or_else(Lookahead::default, Lookahead::with_margin))),
             Self::Beam(beam) => Some(Box::new(Beam::new(beam))),
+            Self::Frugal => Some(Box::new(Frugal::default())),
+            Self::Handmade(share) => Some(Box::new(Handmade::new(Box::new(Beam::default()), share))),
             Self::Repair { method, ticks } => Some(Box::new(
                 ticks.map_or_else(|| Repair::new(method, seed), |ticks| Repair::with_budget(method, ticks, seed)),
             )),
@@ -213,6 +229,8 @@ mod tests {
             "hop-ppo",
             "beam",
             "beam:4x2",
+            "frugal",
+            "beam+handmade:0.35",
             "hop-ppo+lookahead:a",
             "repair",
             "repair:30000",
@@ -233,6 +251,9 @@ mod tests {
             "heuristic",
             "beam:0x2",
             "beam:4",
+            "beam+handmade",
+            "beam+handmade:1.5",
+            "frugal:2",
             "repair:0",
             "repair:much",
             "aspen:4",

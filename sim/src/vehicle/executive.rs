@@ -2,12 +2,13 @@
 
 use nalgebra::Vector3;
 
-use crate::task::{Task, TaskOutcome, TaskRecord};
+use crate::task::{Duty, Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::guidance::{Guidance, GuidanceTick};
 use crate::vehicle::health::{Health, Watch};
 use crate::vehicle::model::Model;
+use crate::vehicle::resources::{Activity, Imager};
 
 /// The satellite at a tick, as the executive is told of it.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +32,10 @@ pub struct Executive {
     active: Option<Active>,
     /// There is none in a planner's head, where everything is as the model says.
     watch: Option<Box<Watch>>,
+    /// How long the imager warms up [ticks].
+    warm_up: u32,
+    /// What the image of the task that ended last is worth, until that is told.
+    image_worth: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +51,10 @@ impl Executive {
     /// An executive without a task.
     #[must_use]
     pub fn new(model: &Model) -> Self {
-        Self { guidance: Guidance::new(model), judge: None, active: None, watch: None }
+        let warm_up = model.config.resources.as_ref().map_or(0, |it| model.period.ticks_ceil(it.imager_warm_up_s));
+        // What another one had begun to image is worth nothing.
+        let image_worth = Some(0.0);
+        Self { guidance: Guidance::new(model), judge: None, active: None, watch: None, warm_up, image_worth }
     }
 
     /// The same, watching wheels and sensors; `noisy` is whether the sensors are known to be.
@@ -132,7 +140,30 @@ impl Executive {
         let judged = self.judge(sight).and_then(|(judge, truth)| judge.finish(now, r_BN_N, truth));
         let seen = self.guidance.finish(now, r_BN_N, &body);
         let outcome = judged.or(seen).filter(|_| begun).unwrap_or(TaskOutcome::NOT_BEGUN);
+        if let Task::Image { strip, .. } = &task {
+            self.image_worth = Some(if outcome.failure.is_none() { strip.priority } else { 0.0 });
+        }
         Some(TaskRecord::new(number, &task, start.min(now), now, outcome))
+    }
+
+    /// What imager, transmitter and thrusters do over the tick that begins now. What an image is worth is told once.
+    pub fn activity(&mut self, now: Tick) -> Activity {
+        let mut activity = Activity { image_worth: self.image_worth.take(), ..Activity::default() };
+        let Some((task, start)) = self.task().filter(|(_, start)| *start <= now) else { return activity };
+        match *task {
+            Task::Image { id, t_pre, .. } => {
+                let to_go = start.after(t_pre).since(now);
+                if to_go <= 0 {
+                    activity.imager = Imager::Records(id);
+                } else if to_go <= i64::from(self.warm_up) {
+                    activity.imager = Imager::Warm;
+                }
+            }
+            Task::Serve { duty: Duty::Downlink, .. } => activity.downlink = true,
+            Task::Serve { duty: Duty::Desaturate, .. } => activity.desaturate = Some(now.since(start) as u32),
+            Task::Serve { duty: Duty::Charge, .. } | Task::Wait { .. } => {}
+        }
+        activity
     }
 
     /// One control tick: the torque command computed from what is seen now. Without a task the torque is zero.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::task::{Duty, Task, TaskOutcome, TaskRecord};
+use crate::task::{Task, TaskOutcome, TaskRecord};
 use crate::time::Tick;
 use crate::vehicle::dynamics::BodyState;
 use crate::vehicle::executive::{Executive, Sight};
@@ -10,7 +10,7 @@ use crate::vehicle::guidance::GuidanceTick;
 use crate::vehicle::health;
 use crate::vehicle::health::Health;
 use crate::vehicle::model::Model;
-use crate::vehicle::resources::{Activity, Imager, ResourceState};
+use crate::vehicle::resources::ResourceState;
 use crate::vehicle::spacecraft::Spacecraft;
 use crate::world::orbit::Orbit;
 
@@ -42,16 +42,13 @@ pub struct Flight {
     pub spacecraft: Spacecraft,
     executive: Executive,
     torque_pending: Vector3<f64>,
-    /// How long the imager warms up [ticks].
-    warm_up: u32,
 }
 
 impl Flight {
     /// A flight of a spacecraft by what `model` says of it.
     #[must_use]
     pub fn new(model: &Model, spacecraft: Spacecraft) -> Self {
-        let warm_up = model.config.resources.as_ref().map_or(0, |it| model.period.ticks_ceil(it.imager_warm_up_s));
-        Self { spacecraft, executive: Executive::new(model), torque_pending: Vector3::zeros(), warm_up }
+        Self { spacecraft, executive: Executive::new(model), torque_pending: Vector3::zeros() }
     }
 
     /// Gives it an executive that watches wheels and sensors; `noisy` is whether the sensors are known to be.
@@ -76,6 +73,15 @@ impl Flight {
         self.spacecraft.now = situation.now;
         self.executive.guidance.servo_integral = situation.servo_integral;
         self.torque_pending = situation.torque_pending;
+    }
+
+    /// Goes on from what is known of the satellite at another time, with the wheels that it is known to have.
+    pub fn resume(&mut self, model: &Model, situation: &Situation) {
+        self.rewind(situation);
+        if health::lost(&situation.wheels) {
+            self.spacecraft.refit(model.plant.limited(&situation.wheels));
+            self.executive.guidance.wheel_lost = true;
+        }
     }
 
     /// Simulated time.
@@ -116,6 +122,17 @@ impl Flight {
     /// Flies a task to its end, or to `until` when that comes first; then the task counts as interrupted.
     pub fn fly(&mut self, task: Task, until: Tick) -> TaskOutcome {
         self.fly_number(0, task, 0, until).outcome
+    }
+
+    /// The same to its end, showing the spacecraft after each tick.
+    pub fn fly_showing(&mut self, task: Task, mut show: impl FnMut(&mut Spacecraft)) -> TaskOutcome {
+        self.begin(task);
+        for _ in 0..task.ticks() {
+            self.tick();
+            show(&mut self.spacecraft);
+        }
+        let sight_then = sight(&mut self.spacecraft);
+        self.executive.finish(&sight_then).map_or(TaskOutcome::NOT_BEGUN, |record| record.outcome)
     }
 
     /// Flies task `number` after `delay` ticks in which the attitude is held, to its end or to `until`.
@@ -184,31 +201,11 @@ impl Flight {
     #[inline]
     fn advance(&mut self) {
         if self.spacecraft.onboard().is_some() {
-            let activity = self.activity();
+            let activity = self.executive.activity(self.spacecraft.now);
             self.spacecraft.advance_doing(&self.torque_pending, activity);
         } else {
             self.spacecraft.advance(&self.torque_pending);
         }
-    }
-
-    /// What imager, transmitter and thrusters do over the tick that begins now.
-    fn activity(&self) -> Activity {
-        let (now, mut activity) = (self.now(), Activity::default());
-        let Some((task, start)) = self.executive.task().filter(|(_, start)| *start <= now) else { return activity };
-        match *task {
-            Task::Image { id, t_pre, .. } => {
-                let to_go = start.after(t_pre).since(now);
-                if to_go <= 0 {
-                    activity.imager = Imager::Records(id);
-                } else if to_go <= i64::from(self.warm_up) {
-                    activity.imager = Imager::Warm;
-                }
-            }
-            Task::Serve { duty: Duty::Downlink, .. } => activity.downlink = true,
-            Task::Serve { duty: Duty::Desaturate, .. } => activity.desaturate = Some(now.since(start) as u32),
-            Task::Serve { duty: Duty::Charge, .. } | Task::Wait { .. } => {}
-        }
-        activity
     }
 }
 

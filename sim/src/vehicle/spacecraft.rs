@@ -10,7 +10,7 @@ use crate::vehicle::errors::{PlantErrors, Sensor};
 use crate::vehicle::faults::{Faults, TimedFault};
 use crate::vehicle::initial::InitialState;
 use crate::vehicle::model::Model;
-use crate::vehicle::resources::{Activity, Onboard};
+use crate::vehicle::resources::{Activity, Onboard, ResourceState};
 use crate::world::orbit::Orbit;
 
 /// What the spacecraft tells of itself at a tick.
@@ -28,6 +28,8 @@ pub struct StateSample {
     pub truth: Option<BodyState>,
     /// Torque that acted over the tick that ended here [N m].
     pub torque_applied: Vector3<f64>,
+    /// How power, data and momentum stand, where they have bounds.
+    pub resources: Option<ResourceState>,
 }
 
 /// The spacecraft: it integrates what it is told.
@@ -163,6 +165,7 @@ impl Spacecraft {
             body: *self.measured(),
             truth: self.truth().copied(),
             torque_applied: self.torque_applied,
+            resources: self.onboard().map(|onboard| *onboard.state()),
         }
     }
 

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use swath_sim::learn::statistics::ResourceScore;
 use swath_sim::planner::PlannerSpec;
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_training::TrainingError;
@@ -48,7 +49,28 @@ impl Evaluation {
         for (planner, missions) in self.planners.iter().zip(&own.flown) {
             table += &row(&planner.to_string(), missions, &own.flown[0], base);
         }
-        table + &strips(&own.flown[0])
+        table + &strips(&own.flown[0]) + &self.delivered(own)
+    }
+
+    /// A table of what came to the ground, where resources have bounds.
+    fn delivered(&self, own: &OnPlant) -> String {
+        let rows = self.planners.iter().zip(&own.flown).filter_map(|(planner, missions)| {
+            let delivered = spread(missions, delivered_per_orbit)?;
+            let base = own.flown.first().and_then(|first| spread(first, delivered_per_orbit));
+            let count =
+                |of: fn(&ResourceScore) -> u64| missions.iter().filter_map(|it| it.resources.as_ref()).map(of).sum();
+            let (violations, failures): (u64, u64) = (count(|it| it.floor_violations), count(|it| it.failures));
+            Some(format!(
+                "{:<34} {:>15} {:>8} {:>9} {:>7} {violations:>10} {failures:>8}\n",
+                planner.to_string(),
+                cell(Some(delivered.mean), 3),
+                cell(delivered.confidence_95, 3),
+                percent(base.filter(|base| base.mean > 0.0).map(|base| delivered.mean / base.mean - 1.0)),
+                cell(spread(missions, |it| it.resources.map(|it| it.strips_per_orbit)).map(|it| it.mean), 1),
+            ))
+        });
+        let rows: String = rows.collect();
+        if rows.is_empty() { rows } else { format!("\n{DELIVERED_HEADING}{rows}") }
     }
 
     /// Everything as JSON, after what every result begins with.
@@ -137,6 +159,14 @@ impl Sweep {
 const HEADING: &str = "\
 planner                            reward/orbit   ± 95 %  deviation  of first    of T*  success  attempts  imaged  T_pre s  T_acq s  priority\n";
 
+const DELIVERED_HEADING: &str = "\
+planner                            delivered/orbit   ± 95 %  of first  strips  violations failures\n";
+
+/// Priority on the ground per orbit, where resources have bounds.
+fn delivered_per_orbit(mission: &Mission) -> Option<f64> {
+    mission.resources.map(|it| it.delivered_per_orbit)
+}
+
 fn row(name: &str, own: &[Mission], first: &[Mission], best_fixed: Option<&[Mission]>) -> String {
     let reward = spread(own, |it| Some(it.reward_per_orbit));
     let mean = |quantity: fn(&Mission) -> Option<f64>| spread(own, quantity).map(|it| it.mean);
@@ -178,7 +208,7 @@ fn entry(planner: &PlannerSpec, own: &[Mission], first: &[Mission], best_fixed: 
 
 fn summary(own: &[Mission]) -> Value {
     let of = |quantity: fn(&Mission) -> Option<f64>| json!(spread(own, quantity));
-    json!({
+    let mut summary = json!({
         "success_rate": pooled_success(own),
         "requests": of(|it| Some(it.requests as f64)),
         "reachable": of(|it| Some(it.reachable as f64)),
@@ -191,7 +221,18 @@ fn summary(own: &[Mission]) -> Value {
         "wait_s_per_orbit": of(|it| Some(it.wait_s_per_orbit)),
         "failed_attitude": of(|it| it.failed_attitude),
         "failed_elevation": of(|it| it.failed_elevation),
-    })
+    });
+    if own.iter().any(|it| it.resources.is_some()) {
+        let count =
+            |of: fn(&ResourceScore) -> u64| own.iter().filter_map(|it| it.resources.as_ref()).map(of).sum::<u64>();
+        summary["resources"] = json!({
+            "delivered_per_orbit": of(delivered_per_orbit),
+            "strips_per_orbit": of(|it| it.resources.map(|it| it.strips_per_orbit)),
+            "floor_violations": count(|it| it.floor_violations),
+            "failures": count(|it| it.failures),
+        });
+    }
+    summary
 }
 
 /// Summaries of missions grouped by thousands of strips asked for.

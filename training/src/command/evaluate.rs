@@ -19,7 +19,7 @@ use super::output::{JsonTarget, missions_bar, print, tell_other_satellite};
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
     /// A planner: random, heuristic:SECONDS, lookahead, lookahead:TICKS for a margin that is not adapted, beam,
-    /// beam:WIDTHxDEPTH, repair, repair:TICKS for another budget, aspen, these two also with -annealing or -squeaky, or a
+    /// beam:WIDTHxDEPTH, frugal, beam+handmade:SHARE, repair, repair:TICKS for another budget, aspen, these two also with -annealing or -squeaky, or a
     /// policy: hop-ppo, hop-ppo-mlp, h-ppo or discrete-ppo, each also with +lookahead to fly its proposals in the head,
     /// and with :FILE for a policy or checkpoint that is not shipped. May be given several times: the first is what
     /// others are compared with

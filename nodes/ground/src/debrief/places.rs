@@ -117,7 +117,8 @@ mod tests {
         let body = BodyState { sigma_BN, omega_BN_B: Vector3::zeros(), wheel_speed: Vector3::zeros() };
         let r_BN_N = Vector3::new(6.9e6, 1e5, -2e6);
         let zero = Vector3::zeros();
-        let state = StateSample { tick: Tick(12_345), r_BN_N, v_BN_N: zero, body, truth: None, torque_applied: zero };
+        let (tick, truth, resources) = (Tick(12_345), None, None);
+        let state = StateSample { tick, r_BN_N, v_BN_N: zero, body, truth, torque_applied: zero, resources };
         let mut earth = model.earth.clone();
         let (cos, sin) = earth.cos_sin(state.tick);
         let dcm_EN = Rotation3::from_axis_angle(&Vector3::z_axis(), -sin.atan2(cos));

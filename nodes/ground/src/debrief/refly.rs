@@ -96,7 +96,7 @@ pub struct Pair {
 /// A flight in process: each task, and the numbers of the strips that it was chosen from.
 struct Flown {
     tasks: Vec<(SettledTask, TaskLine)>,
-    candidates: Vec<Vec<u64>>,
+    candidates: BTreeMap<u64, Vec<u64>>,
 }
 
 impl ReflyArgs {
@@ -134,7 +134,7 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Resul
     let own = *planner == recorded.mission.planner;
     let planner = GuardedPlanner::new((policies.make)(planner, recorded.mission.seed)?);
     let planner = GatedPlanner { gate, planner };
-    let mut planner = Watching { planner, operators: operators.into(), candidates: Vec::new() };
+    let mut planner = Watching { planner, operators: operators.into(), candidates: BTreeMap::new() };
     // Over DDS, what cannot be flown here has changed no task.
     let faults = recorded.mission.faults.clone().within_one_process();
     let mission = Mission { faults, ..recorded.mission.clone() };
@@ -156,7 +156,8 @@ fn fly(recorded: &Recorded, planner: &PlannerSpec, policies: &Policies) -> Resul
 struct Watching {
     planner: GatedPlanner,
     operators: VecDeque<Action>,
-    candidates: Vec<Vec<u64>>,
+    /// By the number of the task; there are none where the planner was not asked.
+    candidates: BTreeMap<u64, Vec<u64>>,
 }
 
 impl Planner for Watching {
@@ -166,6 +167,10 @@ impl Planner for Watching {
 
     fn forget(&mut self) {
         self.planner.forget();
+    }
+
+    fn minds_resources(&self) -> bool {
+        self.planner.minds_resources()
     }
 
     fn decide(&mut self, context: &DecisionContext<'_>) -> Result<Decision, PlannerError> {
@@ -178,7 +183,8 @@ impl Planner for Watching {
                 _ => {}
             }
         }
-        self.candidates.push(context.candidates.iter().map(|candidate| candidate.id.0).collect());
+        let candidates = context.candidates.iter().map(|candidate| candidate.id.0).collect();
+        self.candidates.insert(context.task, candidates);
         self.planner.decide(context)
     }
 }
@@ -199,7 +205,7 @@ fn compare(recorded: &Recorded, flown: &Flown, planner: &PlannerSpec) -> Result<
         decisions.push(Pair {
             task,
             same: bytes(&then)? == bytes(&now)?,
-            same_candidates: offered.as_ref() == flown.candidates.get(task as usize),
+            same_candidates: offered.as_ref() == flown.candidates.get(&task),
             recorded: then,
             reflown: now,
         });

@@ -27,6 +27,7 @@ use swath_mission::approval::{Gate, GatedPlanner};
 use swath_mission::fallback::{GuardedPlanner, Policies, made_instead};
 use swath_mission::file::Mission;
 use swath_mission::in_process::InProcessMission;
+use swath_mission::link::config::LinkConfig;
 use swath_mission::orders::order::Order;
 use swath_mission::origin::Origins;
 use swath_mission::outcome::{Summary, SummaryInputs};
@@ -67,7 +68,7 @@ pub struct LaunchArgs {
     #[arg(long)]
     pub requests: Option<u32>,
     /// Planner instead of the mission's: random, heuristic:SECONDS, lookahead, lookahead:TICKS, beam, beam:WIDTHxDEPTH,
-    /// repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
+    /// frugal, beam+handmade:SHARE, repair, repair:TICKS, aspen (these two also with -annealing or -squeaky), or a policy: hop-ppo, hop-ppo-mlp, h-ppo
     /// or discrete-ppo, each also with +lookahead, and with :FILE for one that is not shipped.
     #[arg(long)]
     pub planner: Option<PlannerSpec>,
@@ -150,9 +151,6 @@ pub fn run(args: &LaunchArgs, ros: &RosArgs, policies: &Policies) -> Result<Exit
         }
     } else {
         mission.faults.fits_dds()?;
-        if mission.sim.resources.is_some() {
-            bail!("a mission with [resources] flies in one process only: add --in-process");
-        }
     }
     for unseen in mission.stations_never_seen()? {
         tracing::warn!("{unseen}");
@@ -210,10 +208,13 @@ fn fly(
     if args.in_process {
         fly_in_process(&mission, output, policies)
     } else {
+        let predicts = |link: &LinkConfig| link.predicts_h(mission.pace) > 0.0;
+        let learned = matches!(mission.planner, PlannerSpec::Learned { .. });
         let wishes = Wishes {
             record: !args.no_bag,
             console: args.console,
             radio: mission.link.is_some(),
+            foresees_policy: learned && mission.link.as_ref().is_some_and(predicts),
             external: &mission.nodes.external(),
         };
         over_dds::fly(&mission, &mission_file, ros, output, wishes, policies)

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::swath_msgs as msg;
 use swath_node::health::{HEALTH, STATE};
+use swath_node::messages::resource_state::resource_state;
 use swath_node::messages::task_result::task_record;
 use swath_node::out;
 use swath_node::stamp::Stamper;
@@ -33,7 +34,7 @@ use swath_mission::faults::{FaultPlan, What};
 use swath_mission::file::Mission;
 use swath_mission::link::ground::Ground;
 use swath_mission::link::response::LinkSummary;
-use swath_mission::outcome::{OrderOutcome, Summary, SummaryInputs, TaskLine};
+use swath_mission::outcome::{OrderOutcome, ResourcesSummary, Summary, SummaryInputs, TaskLine};
 use swath_mission::requests::journal::{Attempt, Outcome as AttemptOutcome};
 use swath_mission::task_log::TaskLog;
 
@@ -144,7 +145,7 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
         messages_recorded,
         nodes,
         orders: orders(output),
-        resources: None,
+        resources: launcher.resources,
         link: ground.map(|ground| LinkSummary::new(ground.lines(), model.period)),
     };
     Ok(Flown { summary: Summary::new(inputs, launcher.log.totals(), model.period), failure, safe_mode })
@@ -195,6 +196,7 @@ fn record_of(attempt: &Attempt) -> TaskRecord {
         start: attempt.start,
         end: attempt.end,
         strip: Some(attempt.id),
+        duty: None,
         t_pre: attempt.t_pre,
         t_acq: attempt.t_acq,
         outcome: TaskOutcome { failure, max_attitude_error, min_elevation },
@@ -266,6 +268,8 @@ pub(super) struct Launcher {
     pub(super) room_since: Option<Instant>,
     /// Whether the planner has held since the mission came into safe mode.
     pub(super) held: bool,
+    /// What came to the ground and what was left at the last decision point, in a mission with resources.
+    pub(super) resources: Option<ResourcesSummary>,
 }
 
 /// How far the mission has come.
@@ -316,6 +320,7 @@ impl Launcher {
             safe_mode: None,
             planner_status: node.subscription(&graph::PLANNER_STATUS)?,
             held: false,
+            resources: None,
             room_since: None,
             model,
             node,
@@ -395,6 +400,9 @@ impl Launcher {
                 last_news = Instant::now();
                 let (end, began) = (Tick(point.tick), self.flown.map_or(last_news, |flown| flown.began));
                 self.flown = Some(Reached { end, began, last: last_news });
+                if let Some(resources) = point.state.resources.first() {
+                    self.resources = Some(ResourcesSummary::new(&resource_state(resources)?));
+                }
                 if let Some(result) = point.result.first() {
                     self.log.flown(task_record(result)?, &result.strip_name);
                 }

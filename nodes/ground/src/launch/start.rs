@@ -28,6 +28,8 @@ pub struct Wishes<'a> {
     pub console: Option<SocketAddr>,
     /// Whether there is a radio between ground and satellite.
     pub radio: bool,
+    /// Whether the ground predicts what a learned policy decides.
+    pub foresees_policy: bool,
     /// Nodes whose place another program takes.
     pub external: &'a [&'static str],
 }
@@ -95,7 +97,9 @@ pub(super) fn start_nodes(
         own.chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join(STORE))?);
-    fleet.start(graph::REQUEST_MANAGER, "swath-requests", &words(&["-p".to_owned(), store]))?;
+    // libtorch is large: only who needs it has it.
+    let requests = if wishes.foresees_policy { "swath-requests-learned" } else { "swath-requests" };
+    fleet.start(graph::REQUEST_MANAGER, requests, &words(&["-p".to_owned(), store]))?;
     let mut peers = vec![graph::GUIDANCE, graph::REQUEST_MANAGER, graph::PLANNER, graph::LAUNCHER];
     let mut others = vec![(graph::PLANNER, "swath-planner"), (graph::GUIDANCE, "swath-guidance")];
     if wishes.radio {

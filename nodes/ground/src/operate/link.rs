@@ -13,12 +13,13 @@ use swath_node::out;
 use swath_ros::{RosArgs, graph};
 
 use super::client::{Operator, check};
+use super::files::printable;
 use crate::place::Place;
 use crate::requests::json::{time, time_json};
 
 /// `swath link`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: swath link status")]
+#[command(after_help = "Examples:\n  swath link status\n  swath link plan")]
 pub struct LinkArgs {
     #[command(subcommand)]
     command: LinkCommand,
@@ -33,6 +34,8 @@ pub struct LinkArgs {
 enum LinkCommand {
     /// Whether it is open, what waits for it, what has come down, and the next passes.
     Status,
+    /// What the satellite is going to do, as the ground predicts it, and where what came down was otherwise.
+    Plan,
 }
 
 /// How long the latched status may take.
@@ -47,15 +50,24 @@ const PASSES: usize = 5;
 /// # Errors
 /// When nobody answers, or the mission has no radio.
 pub fn run(args: &LinkArgs, ros: &RosArgs) -> Result<()> {
-    let LinkCommand::Status = args.command;
     let operator = Operator::start(&args.place.args(ros))?;
     // Who serves these tells of the radio, if there is one.
     operator.desk(&graph::LIST_WAYS)?;
     let Some(status) = status(&operator)? else { bail!("the mission has no [link]: ground and satellite are one") };
-    match args.json {
-        true => out::print_line(status_json(&status))?,
-        false => out::print(&status_text(&status))?,
-    };
+    match (&args.command, args.json) {
+        (LinkCommand::Status, true) => _ = out::print_line(status_json(&status))?,
+        (LinkCommand::Status, false) => _ = out::print(&status_text(&status))?,
+        (LinkCommand::Plan, as_json) => {
+            let plans = operator.node.subscription(&graph::PREDICTED_PLAN)?;
+            let plan = plans.newest(operator.node.signal(), TIMEOUT)?;
+            let plan = plan
+                .context("the ground predicts nothing: set prediction_h in [link], or wait for the first prediction")?;
+            match as_json {
+                true => out::print_line(plan_json(&plan))?,
+                false => out::print(&plan_text(&plan))?,
+            };
+        }
+    }
     Ok(())
 }
 
@@ -97,18 +109,74 @@ pub fn ways(operator: &Operator, after: u64, count: usize) -> Result<BTreeMap<u6
 /// A way for machines: each step with its tick and its time.
 pub fn way_json(way: &msg::StripWay) -> Value {
     let step = |step: &msg::WayStep| (step.name.clone(), json!({ "tick": step.tick, "time": time_json(&step.time) }));
-    Value::Object(way.steps.iter().map(step).collect::<Map<_, _>>())
+    let mut steps = way.steps.iter().map(step).collect::<Map<_, _>>();
+    if !way.predicted.is_empty() {
+        let predicted = way.predicted.iter().map(step).collect();
+        steps.insert("predicted".to_owned(), Value::Object(predicted));
+    }
+    Value::Object(steps)
 }
 
 /// A way for people.
 pub fn way_text(way: &msg::StripWay) -> String {
-    let lines = way.steps.iter().map(|step| format!("  {:<12}  {}\n", step.name.replace('_', " "), time(&step.time)));
-    std::iter::once("way over the radio\n".to_owned()).chain(lines).collect()
+    let line = |step: &msg::WayStep, mark: &str| {
+        format!("  {:<12}  {}{mark}\n", step.name.replace('_', " "), time(&step.time))
+    };
+    let steps = way.steps.iter().map(|step| line(step, ""));
+    let predicted = way.predicted.iter().map(|step| line(step, ", as predicted"));
+    std::iter::once("way over the radio\n".to_owned()).chain(steps).chain(predicted).collect()
+}
+
+/// What the satellite is going to do, in a line.
+pub fn plan_line(plan: &msg::PredictedPlan) -> String {
+    let imaged = plan.tasks.iter().filter(|task| task.success).count();
+    let next = plan.tasks.iter().find(|task| task.success).map(|task| (task.strip_id, time(&task.imaging)));
+    let next = next.map(|(id, at)| format!(", the next one strip {id} at {at}")).unwrap_or_default();
+    let (equal, compared) = (plan.equal, plan.compared);
+    format!("{imaged} strips to be imaged{next}; {equal} of {compared} tasks known were as predicted")
 }
 
 /// The last step of a way, in a word.
 pub fn way_word(way: &msg::StripWay) -> String {
     way.steps.last().map_or(String::new(), |step| step.name.replace('_', " "))
+}
+
+/// What the satellite is going to do, for people.
+fn plan_text(plan: &msg::PredictedPlan) -> String {
+    let mut text = format!("plan made at {}: {}\n", time(&plan.header.stamp), printable(&plan_line(plan)));
+    if plan.partings > 0 {
+        let (times, reason) = (plan.partings, printable(&plan.parted_reason));
+        _ = writeln!(text, "flight and prediction have parted {times} times, last: {reason}");
+    }
+    _ = writeln!(text, "  {:>6}  {:>7}  {:<20}  {:<20}", "task", "strip", "imaged at", "known at");
+    for task in &plan.tasks {
+        let known = if task.success { time(&task.known) } else { "fails".to_owned() };
+        _ = writeln!(text, "  {:>6}  {:>7}  {:<20}  {known:<20}", task.task, task.strip_id, time(&task.imaging));
+    }
+    text
+}
+
+fn plan_json(plan: &msg::PredictedPlan) -> Value {
+    let task = |task: &msg::PredictedTask| {
+        json!({
+            "task": task.task, "strip": task.strip_id, "start_tick": task.start_tick,
+            "imaging_tick": task.imaging_tick, "imaging": time_json(&task.imaging), "end_tick": task.end_tick,
+            "success": task.success, "known_tick": (task.known_tick > 0).then_some(task.known_tick),
+            "known": time_json(&task.known),
+        })
+    };
+    json!({
+        "time": time_json(&plan.header.stamp),
+        "tick": plan.tick,
+        "since_tick": plan.since_tick,
+        "until_tick": plan.until_tick,
+        "tasks": plan.tasks.iter().map(task).collect::<Vec<_>>(),
+        "compared": { "tasks": plan.compared, "equal": plan.equal, "imaged": plan.imaged, "foretold": plan.foretold },
+        "partings": plan.partings,
+        "parted": (plan.partings > 0).then(|| {
+            json!({ "task": plan.parted_task, "tick": plan.parted_tick, "reason": plan.parted_reason })
+        }),
+    })
 }
 
 /// When a strip that is submitted now can be on board, imaged and known to be, at the earliest.

@@ -103,28 +103,15 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
     let mut refused = 0;
     let count = calls.len();
     for (name, call) in calls {
+        let known = Some(call.id).filter(|id| *id != 0 && link.is_some());
         let answer = desk.call(call)?;
         refused += usize::from(answer.reason_code != 0);
-        let text = if args.json {
-            let opportunities: Vec<_> = answer.opportunities.iter().map(opportunity_json).collect();
-            let mut line = json!({
-                "name": name, "opportunities": opportunities,
-                "reason_code": answer.reason_code, "reason": answer.reason,
-            });
-            if let Some(link) = &link {
-                line["over_the_radio"] = Outlook::new(link, &answer.opportunities).json();
-            }
-            format!("{line}\n")
-        } else if answer.reason_code != 0 {
-            format!("{name}: {} (reason {})\n", answer.reason, answer.reason_code)
-        } else if answer.opportunities.is_empty() {
-            let span =
-                args.hours.map_or("until the mission's end".to_owned(), |hours| format!("in the next {hours} h"));
-            format!("{name}: no chance {span}\n")
-        } else {
-            let radio = link.as_ref().map(|link| Outlook::new(link, &answer.opportunities).text());
-            format!("{name}\n{}{}", opportunity_table(&answer.opportunities), radio.unwrap_or_default())
+        // The way of a strip that is known, as it was and as the ground predicts it.
+        let way = match known {
+            Some(id) => ways(&operator, id - 1, 1)?.remove(&id),
+            None => None,
         };
+        let text = preview_text(args, &name, &answer, link.as_ref(), way.as_ref());
         if !out::print(&text)? {
             break;
         }
@@ -133,6 +120,42 @@ pub fn preview(args: &PreviewArgs, ros: &RosArgs) -> Result<()> {
         bail!("{refused} of {count} strips would be refused");
     }
     Ok(())
+}
+
+/// When a strip could be imaged: its chances, and over a radio how it gets there, as it will if it is known.
+fn preview_text(
+    args: &PreviewArgs,
+    name: &str,
+    answer: &msg::PreviewStripResponse,
+    link: Option<&msg::LinkStatus>,
+    way: Option<&msg::StripWay>,
+) -> String {
+    if args.json {
+        let opportunities: Vec<_> = answer.opportunities.iter().map(opportunity_json).collect();
+        let mut line = json!({
+            "name": name, "opportunities": opportunities,
+            "reason_code": answer.reason_code, "reason": answer.reason,
+        });
+        if let Some(link) = link {
+            line["over_the_radio"] = Outlook::new(link, &answer.opportunities).json();
+        }
+        if let Some(way) = way {
+            line["way"] = way_json(way);
+        }
+        format!("{line}\n")
+    } else if answer.reason_code != 0 {
+        format!("{name}: {} (reason {})\n", answer.reason, answer.reason_code)
+    } else if answer.opportunities.is_empty() {
+        let span = args.hours.map_or("until the mission's end".to_owned(), |hours| format!("in the next {hours} h"));
+        format!("{name}: no chance {span}\n")
+    } else {
+        let radio = match (way, link) {
+            (Some(way), _) => way_text(way),
+            (None, Some(link)) => Outlook::new(link, &answer.opportunities).text(),
+            (None, None) => String::new(),
+        };
+        format!("{name}\n{}{radio}", opportunity_table(&answer.opportunities))
+    }
 }
 
 /// Lists strips.

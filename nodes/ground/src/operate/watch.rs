@@ -8,9 +8,11 @@ use anyhow::Result;
 use clap::Args;
 use swath_msgs::swath_msgs as msg;
 use swath_node::out;
-use swath_ros::{RosArgs, Shutdown, graph};
+use swath_ros::{RosArgs, Shutdown, Subscription, graph};
 
 use super::client::Operator;
+use super::files::printable;
+use super::link::plan_line;
 use super::show::{status_head, status_line};
 use crate::requests::json::{state_name, status_json, time};
 
@@ -40,6 +42,7 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
     let summaries = operator.node.subscription(&graph::REQUEST_SUMMARY)?;
     let planner = operator.node.subscription(&graph::PLANNER_STATUS)?;
     let radio = operator.node.subscription(&graph::LINK_STATUS)?;
+    let plans = operator.node.subscription(&graph::PREDICTED_PLAN)?;
     let live = std::io::stdout().is_terminal() && !args.json;
     let mut view = View::default();
     let mut seen = 0;
@@ -67,13 +70,9 @@ pub fn watch(args: &WatchArgs, ros: &RosArgs) -> Result<()> {
             view.planner = view.radio.is_none().then_some(status);
             news = true;
         }
-        while let Some(status) = radio.take()? {
-            let turned = view.radio.as_ref().is_none_or(|before| before.open != status.open);
-            if !live && !args.json && turned && !out::print_line(radio_line(&status))? {
-                return Ok(());
-            }
-            (view.radio, view.planner) = (Some(status), None);
-            news = true;
+        match view.take_radio(&radio, &plans, !live && !args.json)? {
+            Some(told) => news |= told,
+            None => return Ok(()),
         }
         if live && news {
             out::print(&format!("\x1b[H\x1b[2J{}", view.text()))?;
@@ -107,12 +106,39 @@ fn radio_line(status: &msg::LinkStatus) -> String {
 #[derive(Default)]
 struct View {
     radio: Option<msg::LinkStatus>,
+    plan: Option<msg::PredictedPlan>,
     summary: Option<msg::RequestSummary>,
     planner: Option<msg::PlannerStatus>,
     last: VecDeque<msg::StripStatus>,
 }
 
 impl View {
+    /// Takes what the ground tells of the radio and of what it predicts; returns whether there was anything, and nothing
+    /// where nobody reads what is printed of it.
+    fn take_radio(
+        &mut self,
+        radio: &Subscription<msg::LinkStatus>,
+        plans: &Subscription<msg::PredictedPlan>,
+        prints: bool,
+    ) -> Result<Option<bool>> {
+        let mut news = false;
+        while let Some(status) = radio.take()? {
+            let turned = self.radio.as_ref().is_none_or(|before| before.open != status.open);
+            if prints && turned && !out::print_line(radio_line(&status))? {
+                return Ok(None);
+            }
+            (self.radio, self.planner, news) = (Some(status), None, true);
+        }
+        while let Some(plan) = plans.take()? {
+            let line = || format!("{}  plan: {}", time(&plan.header.stamp), printable(&plan_line(&plan)));
+            if prints && !out::print_line(line())? {
+                return Ok(None);
+            }
+            (self.plan, news) = (Some(plan), true);
+        }
+        Ok(Some(news))
+    }
+
     fn text(&self) -> String {
         let mut text = String::new();
         if let Some(it) = &self.summary {
@@ -131,6 +157,9 @@ impl View {
         }
         if let Some(it) = &self.radio {
             text += &format!("{}\n", radio_line(it));
+        }
+        if let Some(it) = &self.plan {
+            text += &format!("plan: {}\n", printable(&plan_line(it)));
         }
         if let Some(it) = &self.planner {
             text += &super::planner::status_text(it);

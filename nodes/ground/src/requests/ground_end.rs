@@ -15,7 +15,11 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::model::Model;
 use swath_sim::world::strip::StripId;
 
+use super::foresight::Foresight;
 use super::store::Store;
+
+/// How old a prediction may be where the radio never closes [ticks].
+const FORESEE_TICKS: i64 = 2400;
 
 /// The ground of a mission, and its place in the radio's time.
 pub struct GroundEnd {
@@ -32,6 +36,11 @@ pub struct GroundEnd {
     horizon: Tick,
     /// What was sent last, and when.
     sent: Option<(Tick, Vec<Sent>)>,
+    /// The mirror, where there is one, and the tick from which on it was asked last.
+    foresight: Option<Foresight>,
+    foresaw: Option<Tick>,
+    /// Whether the radio was open when it was heard last.
+    open: bool,
 }
 
 impl GroundEnd {
@@ -44,8 +53,40 @@ impl GroundEnd {
         let horizon = mission.horizon(model);
         let requests = RequestLogic::new(model.clone(), &mission.initial(), horizon, mission.rules());
         let ground = Ground::new(requests, radio.rates().0);
-        let (journal, next) = (Vec::new(), Tick(0));
-        Ok(Some(Self { ground, journal, heard: None, next, clock: Tick(0), at_it: false, horizon, sent: None }))
+        Ok(Some(Self {
+            ground,
+            journal: Vec::new(),
+            heard: None,
+            next: Tick(0),
+            clock: Tick(0),
+            at_it: false,
+            horizon,
+            sent: None,
+            foresight: None,
+            foresaw: None,
+            open: false,
+        }))
+    }
+
+    /// From now on, tells a mirror what it is told itself.
+    pub fn foresee(&mut self, foresight: Option<Foresight>) {
+        self.foresight = foresight;
+    }
+
+    /// The mirror, if there is one.
+    #[must_use]
+    pub fn foresight(&self) -> Option<&Foresight> {
+        self.foresight.as_ref()
+    }
+
+    /// The same, for what it says.
+    pub fn foresight_mut(&mut self) -> Option<&mut Foresight> {
+        self.foresight.as_mut()
+    }
+
+    /// No prediction is wanted any more.
+    pub fn end_foresight(&mut self) {
+        self.foresight = None;
     }
 
     /// The ground as a store has it: it is told all that the one before was told.
@@ -55,11 +96,9 @@ impl GroundEnd {
     pub fn take_up(&mut self, store: &Store) -> Result<()> {
         for bytes in store.told()? {
             let told = Told::decode(&bytes).with_context(|| format!("store {} is damaged", store.path().display()))?;
-            let tick = match &told {
-                Told::Heard(tick, _) | Told::Open(tick) => Some(*tick),
-                Told::Asked(_) => None,
-            };
+            let tick = Some(told.at()).filter(|_| !matches!(told, Told::Asked(_)));
             self.heard = self.heard.max(tick);
+            self.foresight.iter().for_each(|foresight| foresight.tell(&told));
             if let (Answer::Sent(sent), Some(tick)) = (self.ground.tell(&told), tick) {
                 self.sent = Some((tick, sent));
             }
@@ -115,7 +154,11 @@ impl GroundEnd {
         let at = self.asking().unwrap_or(Tick(0));
         let action =
             Action { at, initial: self.heard.is_none(), actor: actor.to_owned(), reason: reason.to_owned(), act };
-        match self.tell(Told::Asked(action)) {
+        let answer = self.tell(Told::Asked(action));
+        if self.heard.is_some() {
+            self.want_prediction(at);
+        }
+        match answer {
             Answer::Asked(asked) => asked.map(|id| id.unwrap_or(StripId(0))),
             Answer::Nothing | Answer::Sent(_) => Ok(StripId(0)),
         }
@@ -140,6 +183,10 @@ impl GroundEnd {
     /// The ground sends at the tick that was heard, if the radio is open.
     pub fn send(&mut self, tick: Tick, open: bool) -> Vec<Sent> {
         self.at_it = false;
+        let closed = std::mem::replace(&mut self.open, open) && !open;
+        if closed || self.foresaw.is_none_or(|last| tick.since(last) >= FORESEE_TICKS) {
+            self.want_prediction(tick);
+        }
         let sent = match open.then(|| self.tell(Told::Open(tick))) {
             Some(Answer::Sent(sent)) => sent,
             _ => Vec::new(),
@@ -163,7 +210,14 @@ impl GroundEnd {
         std::mem::take(&mut self.journal)
     }
 
+    /// A prediction from a tick on is wanted: at the start, after each pass, when something is asked, and from time to time.
+    fn want_prediction(&mut self, tick: Tick) {
+        self.foresaw = Some(tick);
+        self.foresight.iter().for_each(|foresight| foresight.want(tick));
+    }
+
     fn tell(&mut self, told: Told) -> Answer {
+        self.foresight.iter().for_each(|foresight| foresight.tell(&told));
         self.journal.push(Entry::Told(told.encode()));
         let answer = self.ground.tell(&told);
         self.journal.extend(self.ground.take_journal());

@@ -3,6 +3,7 @@
 mod book;
 mod desk;
 mod flight;
+mod foresight;
 pub mod ground_end;
 pub mod json;
 mod lock;

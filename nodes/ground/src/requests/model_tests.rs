@@ -258,7 +258,7 @@ impl Trial {
         let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_elevation: 0.5 };
         let (start, end) = (Tick(task * 300), Tick(task * 300 + 300));
         let strip = Some(StripId(i as u64 + 1));
-        let record = TaskRecord { task, start, end, strip, t_pre: 100, t_acq: 200, outcome };
+        let record = TaskRecord { task, start, end, strip, duty: None, t_pre: 100, t_acq: 200, outcome };
         self.simple.end(failure);
         self.logic.on_decision_point(task + 1, end, std::slice::from_ref(&record));
         self.last = Some(record);

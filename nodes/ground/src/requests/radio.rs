@@ -13,7 +13,7 @@ use swath_ros::{Publisher, Subscription, graph};
 use swath_sim::time::Tick;
 
 use super::ground_end::GroundEnd;
-use super::ways::{all_passes, status};
+use super::ways::{all_passes, plan, status};
 
 /// How long the last messages before a fault by order may take to arrive.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
@@ -26,6 +26,9 @@ pub(super) struct RadioSide {
     sent: Publisher<msg::RadioSent>,
     clock: Subscription<Clock>,
     status: Publisher<msg::LinkStatus>,
+    plan: Publisher<msg::PredictedPlan>,
+    /// How often flight and prediction have parted, as it was told last.
+    parted: usize,
     passes: Vec<Pass>,
     open: bool,
     /// When and how the radio was told of last: tick, whether it was open, and what waited.
@@ -40,6 +43,8 @@ impl RadioSide {
             sent: base.node.publisher(&graph::GROUND_SENT)?,
             clock: base.node.subscription(&graph::CLOCK)?,
             status: base.node.publisher(&graph::LINK_STATUS)?,
+            plan: base.node.publisher(&graph::PREDICTED_PLAN)?,
+            parted: 0,
             passes: all_passes(&base.mission, &base.model),
             open: false,
             told: None,
@@ -96,6 +101,27 @@ impl RadioSide {
         }
         self.told = Some((now, self.open, waiting));
         Ok(self.status.publish(&status(end.ground(), &base.stamper, now, self.open, &self.passes))?)
+    }
+
+    /// Tells what the satellite is going to do, when the mirror has said so.
+    pub(super) fn tell_plan(&mut self, end: &mut GroundEnd, base: &MissionNode) -> Result<()> {
+        let Some(foresight) = end.foresight_mut() else { return Ok(()) };
+        match foresight.take() {
+            Ok(None) => {}
+            Ok(Some(foreseen)) => {
+                let plan = plan(&base.stamper, &foreseen);
+                let partings = foreseen.score.partings.len();
+                if std::mem::replace(&mut self.parted, partings) < partings {
+                    tracing::info!("flight and prediction have parted: {}", plan.parted_reason);
+                }
+                self.plan.publish(&plan)?;
+            }
+            Err(error) => {
+                end.end_foresight();
+                base.alarm(Severity::Warn, "no prediction", &error.to_string())?;
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn send(&mut self, sent: &msg::RadioSent) -> Result<()> {

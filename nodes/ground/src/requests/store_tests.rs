@@ -59,7 +59,8 @@ fn busy(store: &mut Store) -> RequestLogic {
         let start = Tick(task * 300);
         logic.on_task(InFlight { task, id, start, t_pre: 100, t_acq: 200 });
         let (strip, outcome) = (Some(id), outcome(failure));
-        let record = TaskRecord { task, start, end: start.after(300), strip, t_pre: 100, t_acq: 200, outcome };
+        let end = start.after(300);
+        let record = TaskRecord { task, start, end, strip, duty: None, t_pre: 100, t_acq: 200, outcome };
         logic.on_decision_point(task + 1, record.end, std::slice::from_ref(&record));
     }
     logic.on_task(InFlight { task: 2, id: accepted[11], start: Tick(600), t_pre: 100, t_acq: 200 });

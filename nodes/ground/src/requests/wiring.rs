@@ -15,6 +15,7 @@ use swath_sim::world::strip::StripId;
 use super::book::Book;
 use super::desk::Desk;
 use super::flight::FlightSide;
+use super::foresight::Foresight;
 use super::ground_end::GroundEnd;
 use super::lock::StoreLock;
 use super::messages;
@@ -23,6 +24,7 @@ use super::radio::{self, RadioSide};
 use super::store::{Durability, Store};
 use super::writer::Writer;
 use swath_mission::alarms::conditions::{Report, STORE_FULL};
+use swath_mission::fallback::Policies;
 use swath_mission::faults::What;
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::orders::action::Act;
@@ -55,12 +57,12 @@ const PROGRAM: Program = Program {
 ///
 /// # Errors
 /// When the node cannot come up, the mission's requests cannot be read, the store cannot be used, or DDS fails.
-pub fn run() -> Result<()> {
+pub fn run(policies: &Policies) -> Result<()> {
     let base = MissionNode::start(&PROGRAM)?;
     let spec = Spec::new(STORE.name, String::new(), STORE.about);
     let path = PathBuf::from(base.node.parameters().declare(spec.read_only())?);
     base.node.parameters().check_given()?;
-    lifecycle::run(base, |base| RequestNode::new(base, path.clone()))
+    lifecycle::run(base, |base| RequestNode::new(base, path.clone(), policies))
 }
 
 struct RequestNode {
@@ -116,7 +118,7 @@ impl Side {
 }
 
 impl RequestNode {
-    fn new(base: MissionNode, path: PathBuf) -> Result<Self> {
+    fn new(base: MissionNode, path: PathBuf, policies: &Policies) -> Result<Self> {
         let (path, temporary) = if path.as_os_str().is_empty() {
             tracing::warn!("requests do not outlast this process: parameter `store` is not set");
             let folder = tempfile::tempdir().context("cannot make a temporary store")?;
@@ -127,7 +129,7 @@ impl RequestNode {
         let lock = StoreLock::take(&path, base.goes_on())?;
         let mut store = Store::open(&path, &base.mission.identity())?;
         let reader = Store::open_read_only(&path)?;
-        let book = take_up(&base, &mut store)?;
+        let book = take_up(&base, &mut store, policies)?;
         let mut node = Self {
             desk: Desk::new(&base.node)?,
             side: Side::new(&base)?,
@@ -205,7 +207,10 @@ impl RequestNode {
         self.hand_over(outgoing);
         match (&mut self.side, &mut self.book) {
             (Side::Flight(side), Book::Whole(logic)) => side.tell_aborts(logic, &self.base)?,
-            (Side::Radio(side), Book::Ground(end)) => side.tell_status(end, &self.base)?,
+            (Side::Radio(side), Book::Ground(end)) => {
+                side.tell_status(end, &self.base)?;
+                side.tell_plan(end, &self.base)?;
+            }
             _ => {}
         }
         for contradiction in self.book.take_contradictions() {
@@ -379,8 +384,13 @@ impl LifecycleNode for RequestNode {
 }
 
 /// The requests as they stood, or those of the mission when it begins.
-fn take_up(base: &MissionNode, store: &mut Store) -> Result<Book> {
+fn take_up(base: &MissionNode, store: &mut Store, policies: &Policies) -> Result<Book> {
     if let Some(mut end) = GroundEnd::new(&base.mission, &base.model)? {
+        match Foresight::start(&base.mission, base.model.period, policies) {
+            Ok(foresight) => end.foresee(foresight),
+            // The mission is flown without.
+            Err(error) => tracing::warn!("nothing is predicted: {error:#}"),
+        }
         match store.snapshot()?.begun {
             true => end.take_up(store)?,
             false => take_initial(base, |order| {

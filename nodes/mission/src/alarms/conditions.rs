@@ -1,8 +1,10 @@
 //! What nodes report of conditions that follow from the mission itself, so that each flight of it reports the same.
 
 use serde::{Deserialize, Serialize};
+use swath_sim::config::resources::ResourcesConfig;
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::health::Health;
+use swath_sim::vehicle::resources::{Failure as Failed, ResourceState};
 
 use super::board::{Board, Key};
 use super::definitions::Severity;
@@ -21,6 +23,8 @@ const LAUNCHER: &str = "launcher";
 
 /// The alarm of messages that are dropped.
 const MESSAGES_DROPPED: &str = "messages dropped";
+/// The alarm of frames of the radio that are lost by order.
+const FRAMES_LOST: &str = "frames lost";
 /// The alarm of a store that cannot be written.
 pub const STORE_FULL: &str = "store full";
 /// The alarm of a bag that cannot be written.
@@ -85,6 +89,35 @@ pub fn of_health(tick: Tick, health: &Health) -> Vec<Report> {
     reports
 }
 
+/// Charge above the floor, over the capacity, at which the battery counts as low.
+const LOW: f64 = 0.05;
+/// Share of the storage at which it counts as full.
+const FULL: f64 = 0.95;
+/// Share of its limit at which a wheel's momentum counts as high.
+const HIGH: f64 = 0.8;
+
+/// What guidance reports of power, data and momentum at a decision.
+#[must_use]
+pub fn of_resources(tick: Tick, state: &ResourceState, config: &ResourcesConfig) -> Vec<Report> {
+    let report = |name, wrong, text| Report::new(tick, GUIDANCE, name, wrong, text);
+    let percent = |share: f64| share * 100.0;
+    let (level, floor) = (state.level(), config.battery_floor);
+    let stored = state.stored_bits as f64 / (state.storage_bits as f64).max(1.0);
+    let (momentum, limit) = (state.momentum_nms, config.wheel_momentum_max_nms);
+    let failed = match state.safe_mode {
+        None => "it goes on",
+        Some(Failed::BatteryEmpty) => "the battery was empty: the satellite charges until it is above its floor",
+        Some(Failed::WheelMomentum) => "a wheel was over its limit: the satellite only sees to that",
+    };
+    let charge = format!("{:.1} % of its capacity, the floor is {:.1} %", percent(level), percent(floor));
+    vec![
+        report("battery low", level < floor + LOW, charge),
+        report("storage full", stored > FULL, format!("{:.1} % is taken", percent(stored))),
+        report("momentum high", momentum > HIGH * limit, format!("{momentum:.2} N m s of {limit} N m s")),
+        report("power or wheels failed", state.safe_mode.is_some(), failed.to_owned()),
+    ]
+}
+
 /// What the planner reports of a decision: why another one, `name`, made it in its place.
 #[must_use]
 pub fn of_planner(tick: Tick, replaced: Option<&str>, name: &str) -> Report {
@@ -125,6 +158,7 @@ fn planned(it: &Scheduled) -> Option<(&'static str, String, String)> {
         What::Process(process, Failure::Kill) => alarm(format!("{} lost", process.name()), "killed by order"),
         What::Process(process, Failure::Hang) => alarm(format!("{} lost", process.name()), "hangs by order"),
         What::Drop(_) => alarm(MESSAGES_DROPPED.to_owned(), &format!("{} by order", it.what)),
+        What::FramesLost(_) => alarm(FRAMES_LOST.to_owned(), &format!("{} by order", it.what)),
         What::StoreFull => alarm(STORE_FULL.to_owned(), "full by order"),
         What::BagFull => alarm(BAG_FULL.to_owned(), "full by order"),
         What::Vehicle(_) => None,

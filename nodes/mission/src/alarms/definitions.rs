@@ -111,6 +111,42 @@ pub const DEFINITIONS: &[Definition] = &[
         ],
     ),
     lasting(
+        "battery low",
+        Severity::Warn,
+        [
+            "the charge is less than 5 % of the capacity above the battery's floor",
+            "the shield charges instead of imaging, where it is on; at nothing the satellite comes into safe mode",
+            "nothing, with a shield; else ask for less, or switch the shield on",
+        ],
+    ),
+    lasting(
+        "storage full",
+        Severity::Warn,
+        [
+            "more than 95 % of the on-board storage is taken",
+            "an image that finds no room is thrown away",
+            "look at the next contacts; ask for less until then",
+        ],
+    ),
+    lasting(
+        "momentum high",
+        Severity::Warn,
+        [
+            "a wheel has more than 80 % of the momentum that it may have",
+            "slews take longer; over the limit the wheel counts as failed",
+            "look whether rods or thrusters take it out",
+        ],
+    ),
+    lasting(
+        "power or wheels failed",
+        Severity::Error,
+        [
+            "the battery was empty, or a wheel's momentum was over its limit",
+            "the satellite charges or takes momentum out, and images nothing until that is mended",
+            "look at what was flown before; it goes on by itself",
+        ],
+    ),
+    lasting(
         "planner replaced",
         Severity::Error,
         [
@@ -143,6 +179,15 @@ pub const DEFINITIONS: &[Definition] = &[
         [
             "messages between nodes are lost, by order",
             "what is not answered is asked again; ticks of a paced mission may pass without a torque command",
+            "nothing, if it returns; plan no drill for the time of an important pass",
+        ],
+    ),
+    lasting(
+        "frames lost",
+        Severity::Warn,
+        [
+            "frames of the radio are lost, by order",
+            "what does not get through is sent again; orders and results come later, or at the next pass",
             "nothing, if it returns; plan no drill for the time of an important pass",
         ],
     ),

@@ -20,13 +20,25 @@ pub enum Process {
     RequestManager,
     /// Writes the bag.
     Recorder,
+    /// Keeps what was uplinked, in missions with a radio.
+    Catalogue,
+    /// The radio.
+    Link,
 }
 
 impl Process {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Spacecraft, Self::Guidance, Self::Planner, Self::RequestManager, Self::Recorder];
+    pub const ALL: [Self; 7] = [
+        Self::Spacecraft,
+        Self::Guidance,
+        Self::Planner,
+        Self::RequestManager,
+        Self::Recorder,
+        Self::Catalogue,
+        Self::Link,
+    ];
 
-    /// Those that can fail in a mission in one process.
+    /// Those that a mission in one process can be without.
     pub const IN_PROCESS: [Self; 3] = [Self::Guidance, Self::Planner, Self::RequestManager];
 
     /// Name of the node.
@@ -38,7 +50,15 @@ impl Process {
             Self::Planner => "planner",
             Self::RequestManager => "request_manager",
             Self::Recorder => "recorder",
+            Self::Catalogue => "catalogue",
+            Self::Link => "link",
         }
+    }
+
+    /// Whether it is part of the radio.
+    #[must_use]
+    pub fn is_of_radio(self) -> bool {
+        matches!(self, Self::Catalogue | Self::Link)
     }
 }
 
@@ -58,6 +78,8 @@ pub enum What {
     Process(Process, Failure),
     /// This share of all messages is dropped, 0 to 1.
     Drop(f64),
+    /// This share of the radio's frames is lost besides, 0 to 1.
+    FramesLost(f64),
     /// A wheel or a sensor.
     Vehicle(Fault),
     /// Nothing can be written to the store of requests.
@@ -89,8 +111,8 @@ pub enum GrammarError {
     },
     /// There is no such part.
     #[error(
-        "`{text}`: there is no part `{part}`; there are spacecraft, guidance, planner, request_manager, recorder, topic, \
-         wheel1, wheel2, wheel3, gyro, startracker, store and bag"
+        "`{text}`: there is no part `{part}`; there are spacecraft, guidance, planner, request_manager, recorder, catalogue, \
+         link, topic, wheel1, wheel2, wheel3, gyro, startracker, store and bag"
     )]
     Part {
         /// The text.
@@ -165,10 +187,14 @@ fn parse_what(text: &str, part: &str, what: &str) -> Result<What, GrammarError> 
         Err(GrammarError::What { text, part, what, can })
     };
     if let Some(process) = Process::ALL.into_iter().find(|process| process.name() == part) {
-        return match what {
-            "kill" => Ok(What::Process(process, Failure::Kill)),
-            "hang" => Ok(What::Process(process, Failure::Hang)),
-            _ => cannot("kill or hang"),
+        return match (process, what.split_once(' ')) {
+            (Process::Link, Some(("drop", value))) => {
+                Ok(What::FramesLost(percent(text, "the share dropped", value.trim())?))
+            }
+            (Process::Link, _) if !matches!(what, "kill" | "hang") => {
+                cannot("kill, hang, or drop a share of its frames, such as drop 20%")
+            }
+            _ => of_process(process, what).map_or_else(|| cannot("kill or hang"), Ok),
         };
     }
     match (part, what.split_once(' ').map_or((what, None), |(word, value)| (word, Some(value.trim())))) {
@@ -192,6 +218,14 @@ fn parse_what(text: &str, part: &str, what: &str) -> Result<What, GrammarError> 
         ("bag", ("full", None)) => Ok(What::BagFull),
         ("store" | "bag", _) => cannot("be full"),
         _ => Err(GrammarError::Part { text: text.to_owned(), part: part.to_owned() }),
+    }
+}
+
+fn of_process(process: Process, what: &str) -> Option<What> {
+    match what {
+        "kill" => Some(What::Process(process, Failure::Kill)),
+        "hang" => Some(What::Process(process, Failure::Hang)),
+        _ => None,
     }
 }
 
@@ -244,12 +278,23 @@ fn degrees(rad: f64) -> f64 {
 }
 
 impl What {
+    /// Whether it can only happen where there is a radio.
+    #[must_use]
+    pub fn is_of_radio(&self) -> bool {
+        match self {
+            Self::Process(process, _) => process.is_of_radio(),
+            Self::FramesLost(_) => true,
+            _ => false,
+        }
+    }
+
     /// Name of the part that fails.
     #[must_use]
     pub fn part(&self) -> &'static str {
         match self {
             Self::Process(process, _) => process.name(),
             Self::Drop(_) => "topic",
+            Self::FramesLost(_) => "link",
             Self::Vehicle(Fault::Wheel(0, _)) => "wheel1",
             Self::Vehicle(Fault::Wheel(1, _)) => "wheel2",
             Self::Vehicle(Fault::Wheel(..)) => "wheel3",
@@ -267,7 +312,7 @@ impl fmt::Display for What {
         match *self {
             Self::Process(_, Failure::Kill) => write!(f, "{part}:kill"),
             Self::Process(_, Failure::Hang) => write!(f, "{part}:hang"),
-            Self::Drop(share) => write!(f, "{part}:drop {}%", percentage(share)),
+            Self::Drop(share) | Self::FramesLost(share) => write!(f, "{part}:drop {}%", percentage(share)),
             Self::Vehicle(Fault::Wheel(_, WheelFault::Dead)) => write!(f, "{part}:dead"),
             Self::Vehicle(Fault::Wheel(_, WheelFault::Stuck)) => write!(f, "{part}:stuck"),
             Self::Vehicle(Fault::Wheel(_, WheelFault::Weak(lost))) => write!(f, "{part}:weak {}%", percentage(lost)),
@@ -314,6 +359,9 @@ mod tests {
             ("guidance:kill@120s", What::Process(Process::Guidance, Failure::Kill), Some(120.0), None),
             ("planner:hang@300s+10s", What::Process(Process::Planner, Failure::Hang), Some(300.0), Some(10.0)),
             ("topic:drop 20%@400s+60s", What::Drop(0.2), Some(400.0), Some(60.0)),
+            ("link:drop 20%@400s+60s", What::FramesLost(0.2), Some(400.0), Some(60.0)),
+            ("link:kill@400s", What::Process(Process::Link, Failure::Kill), Some(400.0), None),
+            ("catalogue:hang@400s", What::Process(Process::Catalogue, Failure::Hang), Some(400.0), None),
             ("wheel2:dead@600s", What::Vehicle(Fault::Wheel(1, WheelFault::Dead)), Some(600.0), None),
             ("wheel1:stuck@600s", What::Vehicle(Fault::Wheel(0, WheelFault::Stuck)), Some(600.0), None),
             ("wheel3:weak 50%@600s", What::Vehicle(Fault::Wheel(2, WheelFault::Weak(0.5))), Some(600.0), None),
@@ -349,6 +397,9 @@ mod tests {
             ("planner:kill@5", "the time is `5`"),
             ("planner:kill@5s+", "the duration is ``"),
             ("planner:kill@5s+0s", "the duration is `0s`, not seconds above 0"),
+            ("link:drop@5s", "link cannot `drop`; it can kill, hang, or drop a share of its frames"),
+            ("link:drop 0%@5s", "the share dropped is `0%`"),
+            ("catalogue:drop 5%@5s", "catalogue cannot `drop 5%`; it can kill or hang"),
             ("store:empty", "store cannot `empty`; it can be full"),
         ] {
             let error = text.parse::<PlannedFault>().unwrap_err().to_string();
@@ -366,7 +417,7 @@ mod tests {
 
         #[test]
         fn anything_like_a_fault_is_read_or_refused(
-            text in "(guidance|wheel[0-5]|gyro|topic|startracker|bag):(kill|weak|bias|drop|out|full)( [0-9.]{1,6}(%|deg/s))?(@[0-9.]{1,5}(s|min))?(\\+[0-9.]{1,4}s)?",
+            text in "(guidance|wheel[0-5]|gyro|topic|link|startracker|bag):(kill|weak|bias|drop|out|full)( [0-9.]{1,6}(%|deg/s))?(@[0-9.]{1,5}(s|min))?(\\+[0-9.]{1,4}s)?",
         ) {
             if let Ok(fault) = text.parse::<PlannedFault>() {
                 prop_assert_eq!(fault.to_string().parse(), Ok(fault));

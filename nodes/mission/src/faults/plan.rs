@@ -1,5 +1,7 @@
 //! The faults of a mission: checked against each other and against the mission, and as they act at its ticks.
 
+use std::mem::discriminant;
+
 use serde::{Deserialize, Serialize};
 use swath_sim::time::{Tick, TickPeriod};
 use swath_sim::vehicle::faults::{FOR_GOOD, TimedFault};
@@ -69,6 +71,24 @@ pub enum FaultPlanError {
         /// How long it was to be [s].
         for_s: f64,
     },
+    /// Guidance waits for it.
+    #[error(
+        "{fault}: nothing is flown without {part}, so that it cannot be away for simulated time; leave out +{for_s}s"
+    )]
+    Awaited {
+        /// The fault.
+        fault: PlannedFault,
+        /// What is awaited.
+        part: &'static str,
+        /// How long it was to be [s].
+        for_s: f64,
+    },
+    /// There is no radio.
+    #[error("{fault}: the mission has no [link], so nothing of the radio can fail")]
+    NoRadio {
+        /// The fault.
+        fault: PlannedFault,
+    },
     /// Too little would come through.
     #[error("{fault}: in lockstep time stands until a message comes through; drop at most 50%")]
     NothingLeft {
@@ -136,10 +156,10 @@ impl FaultPlan {
         self.plan.is_empty() && self.random == 0
     }
 
-    /// The same with the faults drawn that are to be drawn.
+    /// The same with the faults drawn that are to be drawn; `radio` is whether there is one that can fail.
     #[must_use]
-    pub fn resolved(mut self, seed: u64, horizon: Tick, period: TickPeriod) -> Self {
-        for fault in random::draw(seed, std::mem::take(&mut self.random), horizon, period) {
+    pub fn resolved(mut self, seed: u64, radio: bool, horizon: Tick, period: TickPeriod) -> Self {
+        for fault in random::draw(seed, std::mem::take(&mut self.random), radio, horizon, period) {
             self.plan.push(fault);
             if check(&self.plan, horizon, period).is_err() {
                 self.plan.pop();
@@ -159,6 +179,17 @@ impl FaultPlan {
             return Err(FaultPlanError::TooMany { count });
         }
         check(&self.plan, horizon, period)
+    }
+
+    /// Checks that nothing of a radio fails where there is none.
+    ///
+    /// # Errors
+    /// The first fault that needs one.
+    pub fn fits_no_radio(&self) -> Result<(), FaultPlanError> {
+        match self.plan.iter().find(|fault| fault.what.is_of_radio()) {
+            Some(&fault) => Err(FaultPlanError::NoRadio { fault }),
+            None => Ok(()),
+        }
     }
 
     /// Checks that a mission in one process can fly the faults: there is no spacecraft and no recorder to be lost in it.
@@ -266,6 +297,16 @@ impl FaultPlan {
         self.scheduled(period).into_iter().filter_map(of).collect()
     }
 
+    /// When frames of the radio are lost besides, and which share of them.
+    #[must_use]
+    pub fn frames_lost(&self, period: TickPeriod) -> Vec<(Scheduled, f64)> {
+        let of = |it: Scheduled| match it.what {
+            What::FramesLost(share) => Some((it, share)),
+            _ => None,
+        };
+        self.scheduled(period).into_iter().filter_map(of).collect()
+    }
+
     /// When this happens: the store, or the bag, is full.
     #[must_use]
     pub fn when(&self, what: What, period: TickPeriod) -> Vec<Scheduled> {
@@ -286,7 +327,8 @@ impl FaultPlan {
 /// Whether a mission in one process can fly a fault.
 fn in_one_process(fault: &PlannedFault) -> bool {
     match fault.what {
-        What::Process(process, _) => Process::IN_PROCESS.contains(&process),
+        // Without link or catalogue the clock stands, so that only an alarm tells of their loss.
+        What::Process(process, _) => process.is_of_radio() || Process::IN_PROCESS.contains(&process),
         _ => true,
     }
 }
@@ -300,6 +342,11 @@ fn check(plan: &[PlannedFault], horizon: Tick, period: TickPeriod) -> Result<(),
         if let (What::Process(Process::Spacecraft, _), Some(for_s)) = (fault.what, fault.for_s) {
             return Err(FaultPlanError::OwnsTheClock { fault, for_s });
         }
+        if let (What::Process(process, _), Some(for_s)) = (fault.what, fault.for_s)
+            && process.is_of_radio()
+        {
+            return Err(FaultPlanError::Awaited { fault, part: process.name(), for_s });
+        }
         if it.from >= horizon {
             return Err(FaultPlanError::AfterEnd { fault, end_s: period.time_s(horizon) });
         }
@@ -310,7 +357,8 @@ fn check(plan: &[PlannedFault], horizon: Tick, period: TickPeriod) -> Result<(),
         }
         for (&second, other) in plan.iter().zip(&scheduled).skip(i + 1) {
             let part = fault.what.part();
-            if part == second.what.part() && it.meets(other) {
+            let same = part == second.what.part() && discriminant(&fault.what) == discriminant(&second.what);
+            if same && it.meets(other) {
                 return Err(FaultPlanError::Contradiction { first: Box::new(fault), second: Box::new(second), part });
             }
         }
@@ -353,6 +401,8 @@ mod tests {
                 &["topic:drop 51%@10s+5s"],
                 "topic:drop 51%@10s+5s: in lockstep time stands until a message comes through",
             ),
+            (&["link:drop 5%@10s+9s", "link:drop 6%@12s"], "both change link at the same time"),
+            (&["catalogue:hang@10s+9s"], "nothing is flown without catalogue, so that it cannot be away"),
             (&["topic:drop 5%@10s+9s", "topic:drop 6%@12s"], "both change topic at the same time"),
         ] {
             let error = plan(texts).validate(HORIZON, period()).unwrap_err().to_string();
@@ -366,8 +416,12 @@ mod tests {
             "guidance:kill@6s",
             "spacecraft:kill@10s",
             "store:full+10s",
+            "link:kill@12s",
+            "link:drop 30%@10s+9s",
         ]);
         assert_eq!(fine.validate(HORIZON, period()), Ok(()));
+        let error = fine.fits_no_radio().unwrap_err().to_string();
+        assert_eq!(error, "link:kill@12s: the mission has no [link], so nothing of the radio can fail");
     }
 
     #[test]
@@ -410,22 +464,25 @@ mod tests {
 
     #[test]
     fn what_is_drawn_follows_from_the_seed_and_can_be_flown() {
-        let mut differ = 0;
+        let (mut differ, mut of_radio) = (0, 0);
         for seed in 0..200 {
-            let drawn = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, HORIZON, period());
-            assert_eq!(drawn, FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, HORIZON, period()));
+            let drawn = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, false, HORIZON, period());
+            assert_eq!(drawn, FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, false, HORIZON, period()));
             assert!(!drawn.plan.is_empty() && drawn.random == 0);
             assert_eq!(drawn.validate(HORIZON, period()), Ok(()), "{drawn:?}");
             let texts: Vec<String> = drawn.plan.iter().map(ToString::to_string).collect();
             let read: Vec<PlannedFault> = texts.iter().map(|text| text.parse().unwrap()).collect();
             assert_eq!(read, drawn.plan);
             differ += usize::from(texts != plan_of(seed + 1));
+            let radio = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, true, HORIZON, period());
+            assert_eq!(radio.validate(HORIZON, period()), Ok(()), "{radio:?}");
+            of_radio += radio.plan.iter().filter(|fault| fault.what.is_of_radio()).count();
         }
-        assert!(differ > 190);
+        assert!(differ > 190 && of_radio > 100, "{differ} {of_radio}");
     }
 
     fn plan_of(seed: u64) -> Vec<String> {
-        let drawn = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, HORIZON, period());
+        let drawn = FaultPlan { random: 5, ..FaultPlan::default() }.resolved(seed, false, HORIZON, period());
         drawn.plan.iter().map(ToString::to_string).collect()
     }
 }

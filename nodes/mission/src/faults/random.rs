@@ -11,21 +11,26 @@ use super::grammar::{Failure, PlannedFault, Process, What};
 /// Longest fault that is drawn [s].
 const LONGEST_S: f64 = 120.0;
 
+/// Share of the faults that are the radio's, where there is one.
+const OF_RADIO: f64 = 0.4;
+
 /// Faults of a mission of this length; some may contradict others.
 #[must_use]
-pub fn draw(seed: u64, count: u32, horizon: Tick, period: TickPeriod) -> Vec<PlannedFault> {
+pub fn draw(seed: u64, count: u32, radio: bool, horizon: Tick, period: TickPeriod) -> Vec<PlannedFault> {
     let mut rng = rng::stream(seed, rng::FAULTS);
     let end_s = period.time_s(horizon);
-    (0..count).map(|_| fault(&mut rng, end_s)).collect()
+    (0..count).map(|_| fault(&mut rng, radio, end_s)).collect()
 }
 
-fn fault(rng: &mut Rng, end_s: f64) -> PlannedFault {
-    let what = what(rng);
+fn fault(rng: &mut Rng, radio: bool, end_s: f64) -> PlannedFault {
+    let of_radio = radio && rng.random_bool(OF_RADIO);
+    let what = if of_radio { of_the_radio(rng) } else { what(rng) };
     let at_s = tenths(rng.random_range(0.02..0.9) * end_s);
     let lasts = tenths(rng.random_range(1.0..LONGEST_S));
     // Half of the wheels' faults stay; so do none of the others, so that what comes after them is seen too.
     let stays = matches!(what, What::Vehicle(Fault::Wheel(..))) && rng.random_bool(0.5);
     let at_once = match what {
+        What::Process(process, _) if process.is_of_radio() => true,
         What::Process(..) => rng.random_bool(0.5),
         _ => false,
     };
@@ -49,6 +54,13 @@ fn what(rng: &mut Rng) -> What {
         11 => What::Vehicle(Fault::GyroBias((f64::from(rng.random_range(5..=100u32)) / 1000.0).to_radians())),
         _ => What::Vehicle(Fault::StarTrackerOut),
     }
+}
+
+fn of_the_radio(rng: &mut Rng) -> What {
+    let process = if rng.random_bool(0.5) { Process::Link } else { Process::Catalogue };
+    let failure = if rng.random_bool(0.7) { Failure::Kill } else { Failure::Hang };
+    let lost = f64::from(rng.random_range(5..=95u32)) / 100.0;
+    if rng.random_bool(0.5) { What::FramesLost(lost) } else { What::Process(process, failure) }
 }
 
 fn tenths(seconds: f64) -> f64 {

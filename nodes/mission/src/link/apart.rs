@@ -12,6 +12,7 @@ use super::catalogue::Catalogue;
 use super::channel::Channel;
 use super::ground::Ground;
 use super::radio::{Direction, Radio};
+use super::told::{Answer, Told};
 use crate::absences::{Absences, Presence};
 use crate::orders::action::Action;
 use crate::requests::journal::InFlight;
@@ -33,6 +34,8 @@ pub struct Apart {
     refused: Vec<(Action, Refusal)>,
     /// When the ground is lost.
     absences: Absences,
+    /// What the ground was told since that was taken last, where somebody wants to know.
+    told: Option<Vec<Told>>,
 }
 
 impl Apart {
@@ -48,7 +51,35 @@ impl Apart {
             to_come: VecDeque::new(),
             refused: Vec::new(),
             absences: Absences::default(),
+            told: Some(Vec::new()),
         }
+    }
+
+    /// Something is asked of the ground before the mission begins. What is refused is in its counts.
+    pub fn ask_first(&mut self, action: Action) {
+        self.tell(Told::Asked(action));
+    }
+
+    /// The same from a tick on, up to which both have heard and sent.
+    #[must_use]
+    pub fn from_tick(mut self, tick: Tick) -> Self {
+        (self.begun, self.finished) = (Some(tick), Some(tick));
+        self
+    }
+
+    /// Something will be asked of the ground, after all that is still to come.
+    pub fn will_also_be_asked(&mut self, action: Action) {
+        self.to_come.push_back(action);
+    }
+
+    /// From now on, nobody wants to know what the ground is told.
+    pub fn forget_told(&mut self) {
+        self.told = None;
+    }
+
+    /// What the ground was told since the last call.
+    pub fn take_told(&mut self) -> Vec<Told> {
+        self.told.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// What is asked of the ground on the way, in order, and when the ground is lost and back.
@@ -102,21 +133,32 @@ impl Apart {
             return;
         }
         for bytes in frames {
-            self.ground.hear(tick, &bytes);
+            self.tell(Told::Heard(tick, bytes));
         }
         while let Some(action) = self.to_come.pop_front_if(|action| action.at <= tick) {
-            if let Err(refusal) = self.ground.ask(action.clone(), tick) {
+            let action = Action { at: tick, ..action };
+            if let Answer::Asked(Err(refusal)) = self.tell(Told::Asked(action.clone())) {
                 self.refused.push((action, refusal));
             }
         }
     }
 
+    /// The ground is told something, which is noted where somebody wants to know.
+    fn tell(&mut self, told: Told) -> Answer {
+        let answer = self.ground.tell(&told);
+        self.told.iter_mut().for_each(|all| all.push(told.clone()));
+        answer
+    }
+
     /// A tick ends: both send, once.
     fn finish(&mut self, tick: Tick) {
-        let first = self.finished.replace(tick).is_none_or(|finished| finished < tick);
+        let first = self.finished.is_none_or(|finished| finished < tick);
+        self.finished = self.finished.max(Some(tick));
         if first && self.radio().open(tick) {
-            if !self.ground_is_left(tick) {
-                self.channel.carry(Direction::Up, tick, self.ground.transmit(tick));
+            if !self.ground_is_left(tick)
+                && let Answer::Sent(sent) = self.tell(Told::Open(tick))
+            {
+                self.channel.carry(Direction::Up, tick, sent);
             }
             self.channel.carry(Direction::Down, tick, self.space.transmit(tick));
         }

@@ -120,7 +120,7 @@ impl Both {
             let InFlight { task, id, start, t_pre, t_acq } = flown;
             let outcome = TaskOutcome { failure, max_attitude_error: 0.01, min_elevation: 1.0 };
             let strip = Some(id);
-            self.space.on_result(&TaskRecord { task, start, end: now, strip, t_pre, t_acq, outcome });
+            self.space.on_result(&TaskRecord { task, start, end: now, strip, duty: None, t_pre, t_acq, outcome });
             self.imaged.extend(failure.is_none().then_some(id));
             self.task += 1;
         }

@@ -8,6 +8,7 @@ use swath_sim::world::strip::StripId;
 
 use super::config::LinkConfig;
 use super::end::{Counts, End, Rates, Sent};
+use super::ground::Known;
 use super::message::{Down, HOUSEKEEPING, Housekeeping, IMAGES, RESULTS, Up, Wish, item, message};
 use crate::requests::journal::{Change, Entry, InFlight};
 use crate::requests::lifecycle::State;
@@ -33,6 +34,8 @@ pub struct Catalogue {
     /// How often housekeeping is sent [ticks], and when it was last.
     housekeeping: (u64, Option<Tick>),
     misread: u64,
+    /// When each request was taken up, in the order of their numbers.
+    on_board: Vec<Tick>,
 }
 
 impl Catalogue {
@@ -48,7 +51,25 @@ impl Catalogue {
             heard: Tick(0),
             housekeeping: (u64::from(period.ticks_ceil(HOUSEKEEPING_S)), None),
             misread: 0,
+            on_board: Vec::new(),
         }
+    }
+
+    /// One that goes on from what the ground knows: what is on board and when it was taken up, how far the radio has
+    /// come, and when the ground was heard last.
+    #[must_use]
+    pub fn known(mut self, known: Known, heard: Tick) -> Self {
+        self.end = End::restored(self.rates, known.kept);
+        for (id, parts) in known.images {
+            self.send_image(id, parts);
+        }
+        Self { requests: known.requests, on_board: known.on_board, heard, ..self }
+    }
+
+    /// When a request was taken up.
+    #[must_use]
+    pub fn on_board(&self, id: StripId) -> Option<Tick> {
+        self.on_board.get(id.index()?).copied()
     }
 
     /// The one that takes over when this one is lost: it knows what was kept, and nothing else.
@@ -131,6 +152,7 @@ impl Catalogue {
     fn tell_taken_up(&mut self, now: Tick, known: &mut usize) {
         let count = self.requests.len() - *known;
         if count > 0 {
+            self.on_board.resize(self.requests.len(), now);
             let first = StripId::from_index(*known);
             self.tell(RESULTS, &Down::OnBoard { at: now, first, count: count as u64 });
             *known += count;
@@ -170,6 +192,10 @@ impl Catalogue {
                 sigma_bn: situation.body.sigma_BN.into(),
                 omega_bn_b: situation.body.omega_BN_B.into(),
                 wheel_speed: situation.body.wheel_speed.into(),
+                servo_integral: situation.servo_integral.into(),
+                torque_pending: situation.torque_pending.into(),
+                wheels: situation.wheels.into(),
+                results: self.end.next(RESULTS),
                 pending: offer.pending as u64,
                 imaged: offer.fulfilled as u64,
             };
@@ -203,7 +229,7 @@ impl Catalogue {
                 Entry::Changed(change) => {
                     let imaged = (change.state == State::Completed).then_some(change.id);
                     self.tell(RESULTS, &Down::Changed(Change { refused: None, ..change }));
-                    imaged.into_iter().for_each(|id| self.send_image(id));
+                    imaged.into_iter().for_each(|id| self.send_image(id, 0));
                 }
                 Entry::Attempted(attempt) => self.tell(RESULTS, &Down::Attempted(attempt)),
                 Entry::Added(_) | Entry::Taken(_) | Entry::Told(_) => {}
@@ -211,11 +237,11 @@ impl Catalogue {
         }
     }
 
-    /// An image comes down in parts of a frame each.
-    fn send_image(&mut self, id: StripId) {
+    /// An image comes down in parts of a frame each, from a part on.
+    fn send_image(&mut self, id: StripId, from: u32) {
         let most = self.end.frame_bits().saturating_sub(PART_BITS).max(1);
         let of = self.strip_bits.div_ceil(most);
-        for part in 0..of {
+        for part in u64::from(from)..of {
             let bits = most.min(self.strip_bits - part * most);
             self.end.push(IMAGES, item(&Down::Image { id, part: part as u32, of: of as u32 }, bits));
         }

@@ -31,6 +31,11 @@ impl Channel {
         &self.radio
     }
 
+    /// The same, to be disturbed.
+    pub fn radio_mut(&mut self) -> &mut Radio {
+        &mut self.radio
+    }
+
     /// The first tick from `from` on at which it is open or a frame arrives; none before the mission's end.
     #[must_use]
     pub fn next_event(&self, from: Tick) -> Option<Tick> {

@@ -7,6 +7,9 @@ use swath_sim::error::SimError;
 use swath_sim::world::stations::NeverSeen;
 use thiserror::Error;
 
+/// How far ahead the ground predicts where a mission does not say [h].
+const PREDICTION_H: f64 = 12.0;
+
 /// When the radio can be heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -45,6 +48,10 @@ pub struct LinkConfig {
     /// until it hears one [h]; it never does without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command_loss_h: Option<f64>,
+    /// How far ahead the ground predicts what the satellite is going to do [h], 0 for no prediction. Without it 12 h, and
+    /// nothing in lockstep, where nobody looks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prediction_h: Option<f64>,
 }
 
 impl Default for LinkConfig {
@@ -60,6 +67,7 @@ impl Default for LinkConfig {
             loss: 0.0,
             strip_bits: 200e6,
             command_loss_h: None,
+            prediction_h: None,
         }
     }
 }
@@ -127,6 +135,12 @@ impl LinkConfig {
         Ok(self.all_stations()?.iter().filter_map(|station| station.never_seen(config)).collect())
     }
 
+    /// How far ahead the ground predicts in a mission of a pace [h]; 0 for no prediction.
+    #[must_use]
+    pub fn predicts_h(&self, pace: f64) -> f64 {
+        self.prediction_h.unwrap_or(if pace > 0.0 { PREDICTION_H } else { 0.0 })
+    }
+
     /// Checks every setting; NaN fails each range.
     ///
     /// # Errors
@@ -139,6 +153,7 @@ impl LinkConfig {
             ("processing_s", self.processing_s, 0.0, 60.0),
             ("loss", self.loss, 0.0, 0.99),
             ("strip_bits", self.strip_bits, 0.0, 1e13),
+            ("prediction_h", self.prediction_h.unwrap_or(0.0), 0.0, 240.0),
             ("command_loss_h", self.command_loss_h.unwrap_or(1.0), 0.01, 1e5),
         ] {
             if !(min..=max).contains(&value) {
@@ -185,6 +200,7 @@ mod tests {
             ("stations = [\"tokyo\"]\nuplink_bps = 0", "uplink_bps is 0, outside 100 to 10000000000"),
             ("stations = [\"tokyo\"]\ndownlink_bps = nan", "downlink_bps is NaN, outside 100 to 100000000000"),
             ("stations = [\"tokyo\"]\nloss = 1.0", "loss is 1, outside 0 to 0.99"),
+            ("stations = [\"tokyo\"]\nprediction_h = -1", "prediction_h is -1, outside 0 to 240"),
             ("stations = [\"tokyo\"]\ncommand_loss_h = 0", "command_loss_h is 0, outside 0.01 to 100000"),
             ("", "mode is \"passes\", but stations and own_stations are empty"),
         ] {

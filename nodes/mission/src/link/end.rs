@@ -160,6 +160,18 @@ impl End {
         self.out.get(class).map_or(0, Outbox::fresh)
     }
 
+    /// Number of the next item of a class.
+    #[must_use]
+    pub fn next(&self, class: usize) -> u64 {
+        self.out.get(class).map_or(0, Outbox::end)
+    }
+
+    /// Number of the next item of a class that is to come.
+    #[must_use]
+    pub fn to_come(&self, class: usize) -> u64 {
+        self.inn.get(class).map_or(0, Inbox::next)
+    }
+
     /// Items of each class that are not known to have arrived.
     #[must_use]
     pub fn waiting(&self) -> [u64; CLASSES] {

@@ -7,11 +7,11 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::StripId;
 
-use super::end::{Counts, End, Rates, Sent};
+use super::end::{Counts, End, Kept, Rates, Sent};
 use super::frame::CLASSES;
-use super::message::{CHANGES, Down, Housekeeping, ORDERS, Up, Wish, item, message};
+use super::message::{CHANGES, Down, Housekeeping, ORDERS, RESULTS, Up, Wish, item, message};
 use crate::orders::action::{Act, Action, Review};
-use crate::requests::journal::Entry;
+use crate::requests::journal::{Attempt, Entry, Progress};
 use crate::requests::lifecycle::State;
 use crate::requests::logic::{Contradiction, RequestLogic};
 use crate::requests::refusal::{Refusal, check_text};
@@ -52,6 +52,37 @@ pub struct Asked {
     pub refusal: Option<String>,
 }
 
+/// What the ground has come to know of the flight.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fact {
+    /// Requests were taken up on board.
+    OnBoard {
+        /// When.
+        at: Tick,
+        /// Number of the first.
+        first: StripId,
+        /// How many.
+        count: u64,
+    },
+    /// An attempt has ended.
+    Attempted(Attempt),
+    /// How the satellite did.
+    Housekeeping(Housekeeping),
+}
+
+/// The satellite at the decision of which housekeeping tells, as far as the ground knows it.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// What was on board.
+    pub requests: RequestLogic,
+    /// When each of them was taken up.
+    pub on_board: Vec<Tick>,
+    /// What has come over the radio.
+    pub kept: Kept,
+    /// Images that are not on the ground as a whole, the oldest first, with the parts that are.
+    pub images: Vec<(StripId, u32)>,
+}
+
 /// What an item on the way up is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum About {
@@ -75,6 +106,10 @@ pub struct Ground {
     in_line: BTreeMap<StripId, u64>,
     housekeeping: Option<Housekeeping>,
     misread: u64,
+    /// Number after the last result that changed what may be imaged.
+    settling: u64,
+    /// What came to be known since that was taken last, where somebody wants to know.
+    facts: Option<Vec<Fact>>,
 }
 
 impl Ground {
@@ -91,7 +126,19 @@ impl Ground {
             in_line: BTreeMap::new(),
             housekeeping: None,
             misread: 0,
+            settling: 0,
+            facts: None,
         }
+    }
+
+    /// From now on, notes what it comes to know.
+    pub fn note_facts(&mut self) {
+        self.facts.get_or_insert_default();
+    }
+
+    /// What came to be known since the last call.
+    pub fn take_facts(&mut self) -> Vec<Fact> {
+        self.facts.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// The one that takes over when this one is lost: it knows what was kept, and nothing else.
@@ -233,13 +280,21 @@ impl Ground {
         self.requests.wait_until(now);
         for arrival in arrivals {
             match message::<Down>(&arrival.item) {
-                Some(down) => self.learn(now, down),
+                Some(down) => {
+                    if arrival.class == RESULTS && settles(&down) {
+                        self.settling = arrival.number + 1;
+                    }
+                    self.learn(now, down);
+                }
                 None => self.misread += 1,
             }
         }
     }
 
     fn learn(&mut self, now: Tick, down: Down) {
+        if let Some(facts) = &mut self.facts {
+            facts.extend(fact(&down));
+        }
         match down {
             Down::OnBoard { at, first, count } => {
                 let from = first.index().unwrap_or(usize::MAX);
@@ -271,6 +326,39 @@ impl Ground {
                 }
             }
         }
+    }
+
+    /// The satellite at the decision of which housekeeping tells; none where what is known is older or newer than that.
+    ///
+    /// # Errors
+    /// When a request is no strip.
+    pub fn known(
+        &self,
+        housekeeping: &Housekeeping,
+        initial: &InitialState,
+        horizon: Tick,
+    ) -> Result<Option<Known>, Refusal> {
+        let newer = self.settling > housekeeping.results || self.end.to_come(RESULTS) < housekeeping.results;
+        let on_board: Vec<Tick> =
+            self.ways.iter().map_while(|way| way.on_board.filter(|_| way.acknowledged.is_some())).collect();
+        // What has arrived, and is not known to have been taken up.
+        let next = StripId::from_index(on_board.len());
+        let between = self.in_line.get(&next).is_some_and(|item| *item < self.end.arrived(ORDERS));
+        if newer || between {
+            return Ok(None);
+        }
+        let progress = Progress { now: housekeeping.at, settled: housekeeping.task, ..Progress::default() };
+        let requests = self.requests.as_on_board(initial, horizon, on_board.len(), progress)?;
+        let class = std::array::from_fn::<_, CLASSES, _>(|class| class);
+        let kept = Kept {
+            to_send: class.map(|class| (self.end.to_come(class), Vec::new())),
+            received: class.map(|class| self.end.arrived(class)),
+        };
+        let mut images: Vec<_> = (1..).map(StripId).zip(&self.ways).collect();
+        images.retain(|(id, way)| self.requests.state(*id) == Some(State::Completed) && way.delivered.is_none());
+        images.sort_by_key(|(id, way)| (way.imaged, *id));
+        let images = images.into_iter().map(|(id, way)| (id, way.parts)).collect();
+        Ok(Some(Known { requests, on_board, kept, images }))
     }
 
     fn way_mut(&mut self, id: StripId) -> Option<&mut Way> {
@@ -360,4 +448,21 @@ pub struct WayLine {
     pub known_tick: Option<Tick>,
     /// See [`Way`].
     pub delivered_tick: Option<Tick>,
+}
+
+/// Whether a result changes what may be imaged.
+fn settles(down: &Down) -> bool {
+    match down {
+        Down::Changed(change) => !matches!(change.state, State::Scheduled | State::Executing),
+        _ => true,
+    }
+}
+
+fn fact(down: &Down) -> Option<Fact> {
+    match down {
+        Down::OnBoard { at, first, count } => Some(Fact::OnBoard { at: *at, first: *first, count: *count }),
+        Down::Attempted(attempt) => Some(Fact::Attempted(attempt.clone())),
+        Down::Housekeeping(housekeeping) => Some(Fact::Housekeeping(*housekeeping)),
+        Down::Answer { .. } | Down::Changed(_) | Down::Image { .. } => None,
+    }
 }

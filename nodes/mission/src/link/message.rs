@@ -1,8 +1,11 @@
 //! What goes up and what comes down.
 
+use nalgebra::Vector3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use swath_sim::time::Tick;
+use swath_sim::vehicle::dynamics::BodyState;
+use swath_sim::vehicle::flight::Situation;
 use swath_sim::world::strip::StripId;
 
 use super::frame::Item;
@@ -111,10 +114,45 @@ pub struct Housekeeping {
     pub omega_bn_b: [f64; 3],
     /// Speeds of the wheels [rad/s].
     pub wheel_speed: [f64; 3],
+    /// The servo's rate-error integral [rad].
+    pub servo_integral: [f64; 3],
+    /// Torque that acts until the next tick [N m].
+    pub torque_pending: [f64; 3],
+    /// Share of its torque limit that each wheel is known to give.
+    pub wheels: [f64; 3],
+    /// Number of the next item in the class of results: the ones before tell of what was until then.
+    pub results: u64,
     /// Strips that are to be imaged.
     pub pending: u64,
     /// Strips imaged.
     pub imaged: u64,
+}
+
+impl Housekeeping {
+    /// Attitude, rate and wheel speeds.
+    #[must_use]
+    pub fn body(&self) -> BodyState {
+        BodyState {
+            sigma_BN: self.sigma_bn.into(),
+            omega_BN_B: self.omega_bn_b.into(),
+            wheel_speed: self.wheel_speed.into(),
+        }
+    }
+
+    /// The satellite at a position [m] and with a velocity [m/s].
+    #[must_use]
+    pub fn situation(&self, r_BN_N: Vector3<f64>, v_BN_N: Vector3<f64>) -> Situation {
+        Situation {
+            now: self.at,
+            r_BN_N,
+            v_BN_N,
+            body: self.body(),
+            servo_integral: self.servo_integral.into(),
+            torque_pending: self.torque_pending.into(),
+            wheels: self.wheels.into(),
+            resources: None,
+        }
+    }
 }
 
 /// The item of a message, with data beside it [bit].

@@ -10,6 +10,8 @@ use swath_sim::world::orbit::Orbit;
 use super::config::{LinkConfig, LinkMode};
 use super::end::{Rates, Sent};
 use super::passes::range_mask_m;
+use crate::faults::FaultPlan;
+use crate::faults::plan::Scheduled;
 use crate::file::{Mission, MissionError};
 
 /// Speed of light [m/s].
@@ -37,6 +39,8 @@ pub struct Radio {
     orbit: Orbit,
     delay_max: u64,
     horizon: Tick,
+    /// When frames are lost besides, by order, and which share.
+    disturbed: Vec<(Scheduled, f64)>,
 }
 
 impl Radio {
@@ -53,7 +57,20 @@ impl Radio {
         let farthest = stations.iter().map(|station| range_mask_m(station, model, &orbit)).fold(0.0, f64::max);
         let (period, seed) = (model.period, mission.seed);
         let delay_max = delay(&config, farthest, period);
-        Ok(Some(Self { config, seed, period, contacts, views, orbit, delay_max, horizon }))
+        let disturbed = mission.faults.frames_lost(period);
+        Ok(Some(Self { config, seed, period, contacts, views, orbit, delay_max, horizon, disturbed }))
+    }
+
+    /// The faults of the mission are these from now on.
+    pub fn disturb(&mut self, faults: &FaultPlan) {
+        self.disturbed = faults.frames_lost(self.period);
+    }
+
+    /// Probability that a frame that leaves at a tick does not arrive.
+    fn loss(&self, tick: Tick) -> f64 {
+        let acts = |(it, _): &&(Scheduled, f64)| it.from <= tick && tick < it.until;
+        let shares = self.disturbed.iter().filter(acts).map(|(_, share)| share);
+        shares.fold(self.config.loss, |loss, share| loss + (1.0 - loss) * share)
     }
 
     /// What the ends' transmitters can do: the ground's, the satellite's.
@@ -117,10 +134,10 @@ impl Radio {
             return Vec::new();
         }
         let mut rng = rng::radio(self.seed, now.0, direction == Direction::Up);
-        let delay = self.delay(now);
+        let (delay, loss) = (self.delay(now), self.loss(now));
         let mut arriving = Vec::new();
         for Sent { bytes, air_ticks } in frames {
-            let lost = rng.random::<f64>() < self.config.loss;
+            let lost = rng.random::<f64>() < loss;
             // The station must hear a frame to its last bit.
             let left = Tick(now.0.saturating_add(air_ticks));
             if !lost && self.open(left) {

@@ -32,6 +32,15 @@ pub enum Answer {
 }
 
 impl Told {
+    /// When.
+    #[must_use]
+    pub fn at(&self) -> Tick {
+        match self {
+            Self::Heard(tick, _) | Self::Open(tick) => *tick,
+            Self::Asked(action) => action.at,
+        }
+    }
+
     /// As bytes of a store.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {

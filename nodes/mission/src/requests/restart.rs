@@ -4,6 +4,8 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::StripId;
 
+use super::journal::Progress;
+use super::lifecycle::State;
 use super::logic::RequestLogic;
 use super::refusal::Refusal;
 use super::request::Stored;
@@ -31,6 +33,30 @@ impl RequestLogic {
     pub fn restarted(&self, initial: &InitialState, horizon: Tick) -> Result<Self, Refusal> {
         let mut fresh = Self::new(self.model.clone(), initial, horizon, self.rules);
         fresh.restore(self.stored(), self.rejected, self.progress, self.last_settled)?;
+        Ok(fresh)
+    }
+
+    /// The first `count` requests as they were on board when the mission had come so far, where no later change is
+    /// known but what is under way since.
+    ///
+    /// # Errors
+    /// When a request is no strip.
+    pub fn as_on_board(
+        &self,
+        initial: &InitialState,
+        horizon: Tick,
+        count: usize,
+        progress: Progress,
+    ) -> Result<Self, Refusal> {
+        let mut stored = self.stored();
+        stored.truncate(count);
+        for it in &mut stored {
+            if matches!(it.request.state, State::Scheduled | State::Executing) {
+                it.request.state = State::Accepted;
+            }
+        }
+        let mut fresh = Self::new(self.model.clone(), initial, horizon, self.rules);
+        fresh.restore(stored, 0, progress, None)?;
         Ok(fresh)
     }
 }

@@ -65,7 +65,7 @@ fn chosen(task: u64, id: StripId) -> InFlight {
 fn record(task: u64, id: StripId, failure: Option<FailureReason>) -> TaskRecord {
     let outcome = TaskOutcome { failure, max_attitude_error: 0.05, min_elevation: 0.5 };
     let (start, end) = (Tick(task * 300), Tick(task * 300 + 300));
-    TaskRecord { task, start, end, strip: Some(id), t_pre: 100, t_acq: 200, outcome }
+    TaskRecord { task, start, end, strip: Some(id), duty: None, t_pre: 100, t_acq: 200, outcome }
 }
 
 /// Imaged at the opening of its first window.

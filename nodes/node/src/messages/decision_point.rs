@@ -22,6 +22,6 @@ pub fn situation(point: &msg::DecisionPoint) -> Result<Situation, MessageError> 
         servo_integral: checked("servo_integral", point.servo_integral, RATE_MAX)?,
         torque_pending: checked("torque_pending", point.torque_pending, TORQUE_MAX)?,
         wheels: checked("wheel_share", point.wheel_share, 1.0)?.map(|share| share.max(0.0)),
-        resources: None,
+        resources: state.resources,
     })
 }

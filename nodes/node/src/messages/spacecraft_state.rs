@@ -6,6 +6,7 @@ use swath_sim::vehicle::dynamics::BodyState;
 use swath_sim::vehicle::spacecraft::StateSample;
 
 use super::numbers::{RATE_MAX, TORQUE_MAX, checked, components, vector3};
+use super::resource_state::{resource_message, resource_state};
 use crate::error::MessageError;
 use crate::stamp::{INERTIAL_FRAME, Stamper};
 
@@ -26,6 +27,7 @@ pub fn spacecraft_state(stamper: &Stamper, sample: &StateSample) -> msg::Spacecr
         omega_bn_b: vector3(&sample.body.omega_BN_B),
         wheel_speed: sample.body.wheel_speed.into(),
         wheel_torque: sample.torque_applied.into(),
+        resources: sample.resources.iter().map(|it| resource_message(stamper, sample.tick, it)).collect::<Vec<_>>(),
     }
 }
 
@@ -45,5 +47,6 @@ pub fn state_sample(state: &msg::SpacecraftState) -> Result<StateSample, Message
             wheel_speed: checked("wheel_speed", state.wheel_speed, WHEEL_SPEED_MAX)?,
         },
         torque_applied: checked("wheel_torque", state.wheel_torque, TORQUE_MAX)?,
+        resources: state.resources.first().map(resource_state).transpose()?,
     })
 }

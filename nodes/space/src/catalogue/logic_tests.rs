@@ -95,6 +95,7 @@ fn a_result_tells_of_the_task_that_was_flown_between_two_turns() {
         start: Tick(40),
         end: Tick(90),
         strip: Some(candidate.id),
+        duty: None,
         t_pre: 30,
         t_acq: 20,
         outcome: TaskOutcome { failure: Some(FailureReason::Attitude), max_attitude_error: 0.5, min_elevation: 1.0 },

@@ -53,6 +53,16 @@ enum Taken {
     Point(Box<msg::DecisionPoint>),
 }
 
+impl Taken {
+    fn tick(&self) -> Tick {
+        match self {
+            Self::Turn(turn) => Tick(turn.tick),
+            Self::Reached(reached) => Tick(reached.tick),
+            Self::Point(point) => Tick(point.tick),
+        }
+    }
+}
+
 /// What was said last.
 #[derive(Default)]
 struct Said {
@@ -168,6 +178,11 @@ impl CatalogueNode {
 
     /// Takes something in: first it is kept, then what follows is said.
     fn take(&mut self, taken: Taken) -> Result<()> {
+        self.base.take_fault_orders()?;
+        // What is not kept here is told again.
+        if self.base.strikes_at().is_some_and(|at| taken.tick() >= at) {
+            self.base.strike();
+        }
         if let Some(journal) = &mut self.journal {
             journal.add(&taken)?;
         }

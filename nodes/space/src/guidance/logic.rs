@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 use swath_mission::requests::journal::InFlight;
+use swath_sim::planner::{DecisionContext, Nobody, Shield, decide};
 use swath_sim::task::{Task, TaskOutcome, TaskRecord};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::executive::{Executive, Sight};
@@ -11,6 +12,7 @@ use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::guidance::GuidanceTick;
 use swath_sim::vehicle::health::Health;
 use swath_sim::vehicle::model::Model;
+use swath_sim::vehicle::resources::Activity;
 use swath_sim::vehicle::spacecraft::StateSample;
 use swath_sim::world::strip::StripId;
 use thiserror::Error;
@@ -105,6 +107,8 @@ pub struct Command {
     pub has_strip: bool,
     /// Ticks that remain of the transition, the imaging or the wait.
     pub remaining: u32,
+    /// What is done besides turning, where resources have bounds.
+    pub activity: Option<Activity>,
 }
 
 /// What a guidance must know to go on where another one was.
@@ -145,6 +149,7 @@ struct Before {
 pub struct GuidanceLogic {
     model: Model,
     executive: Executive,
+    shield: Option<Shield>,
     horizon: Tick,
     hold: u32,
     /// Time from a situation to the start of the task decided on it [ticks].
@@ -178,6 +183,7 @@ impl GuidanceLogic {
     pub fn new(model: Model, horizon: Tick, hold: u32) -> Self {
         Self {
             executive: Executive::new(&model),
+            shield: Shield::new(&model),
             model,
             horizon,
             hold: hold.max(1),
@@ -317,7 +323,8 @@ impl GuidanceLogic {
     /// The command that does nothing: the wheels hold no torque.
     #[must_use]
     pub fn idle(&self, tick: Tick) -> Command {
-        Command { tick, task: self.task, guidance: GuidanceTick::IDLE, has_strip: false, remaining: 0 }
+        let activity = self.model.config.resources.as_ref().map(|_| Activity::default());
+        Command { tick, task: self.task, guidance: GuidanceTick::IDLE, has_strip: false, remaining: 0, activity }
     }
 
     /// Takes the task wanted.
@@ -347,7 +354,7 @@ impl GuidanceLogic {
             return Vec::new();
         }
         self.late += 1;
-        self.begin(TaskOrder { task: self.task, kind: Task::Wait { ticks: self.hold }, name: String::new() }, 0)
+        self.hold(self.hold)
     }
 
     /// There is no planner for `ticks`: holds the attitude for a while, then asks.
@@ -355,8 +362,37 @@ impl GuidanceLogic {
         if self.wanted().is_none() {
             return Vec::new();
         }
-        let kind = Task::Wait { ticks: self.hold.min(ticks).max(1) };
+        self.hold(self.hold.min(ticks).max(1))
+    }
+
+    /// Holds the attitude for `ticks`, where safe mode and the shield have nothing better to do.
+    fn hold(&mut self, ticks: u32) -> Vec<Effect> {
+        let Some(state) = self.waiting.front().copied() else { return Vec::new() };
+        let situation = self.situation(&state);
+        let context = DecisionContext {
+            task: self.task,
+            situation: &situation,
+            candidates: &[],
+            previous: None,
+            model: &self.model,
+        };
+        let decision = decide(self.shield.as_ref(), &context, &mut Nobody { ticks });
+        let kind = decision.and_then(|decision| decision.to_task(&context)).unwrap_or(Task::Wait { ticks });
         self.begin(TaskOrder { task: self.task, kind, name: String::new() }, 0)
+    }
+
+    /// What a planner may know at a state.
+    fn situation(&mut self, state: &StateSample) -> Situation {
+        Situation {
+            now: state.tick,
+            r_BN_N: state.r_BN_N,
+            v_BN_N: state.v_BN_N,
+            body: self.executive.look(&sight(state)),
+            servo_integral: self.executive.guidance.servo_integral,
+            torque_pending: self.torque_pending,
+            wheels: self.executive.health().wheels,
+            resources: state.resources,
+        }
     }
 
     /// A task is no longer wanted: it ends at the next state, unless imaging has begun. Returns whether it ends.
@@ -401,23 +437,13 @@ impl GuidanceLogic {
         if self.executive.task().is_some() {
             return vec![self.fly(&state)];
         }
-        let body = self.executive.look(&sight(&state));
-        let situation = Situation {
-            now: state.tick,
-            r_BN_N: state.r_BN_N,
-            v_BN_N: state.v_BN_N,
-            body,
-            servo_integral: self.executive.guidance.servo_integral,
-            torque_pending: self.torque_pending,
-            wheels: self.executive.health().wheels,
-            resources: None,
-        };
+        let situation = self.situation(&state);
         if !over {
             self.waiting.push_back(state);
         }
         vec![Effect::Decide(Box::new(DecisionPoint {
             task: self.task,
-            state: StateSample { body, ..state },
+            state: StateSample { body: situation.body, ..state },
             situation,
             mission_over: over,
             finished: self.finished.clone(),
@@ -468,7 +494,8 @@ impl GuidanceLogic {
             Some((task, start)) => (false, left(start.after(task.ticks()))),
             None => (false, 0),
         };
-        let command = Command { tick: state.tick, task: self.task, guidance, has_strip, remaining };
+        let activity = self.model.config.resources.as_ref().map(|_| self.executive.activity(state.tick));
+        let command = Command { tick: state.tick, task: self.task, guidance, has_strip, remaining, activity };
         self.earlier = self.latest.replace(command.clone());
         Effect::Command(command)
     }

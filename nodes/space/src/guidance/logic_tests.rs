@@ -4,17 +4,18 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use swath_sim::config::SimConfig;
+use swath_sim::config::resources::{Profile, ResourcesConfig};
 use swath_sim::learn::episode::{Env, EpisodeConfig};
-use swath_sim::planner::{Heuristic, Planner};
+use swath_sim::planner::Heuristic;
 use swath_sim::rng;
-use swath_sim::task::{Task, TaskOutcome};
+use swath_sim::task::{Duty, Task, TaskOutcome};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::errors::PlantErrors;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::vehicle::model::Model;
 use swath_sim::vehicle::spacecraft::Spacecraft;
 
-use super::logic::{Effect, GuidanceLogic, TaskError, TaskOrder};
+use super::logic::{Command, Effect, GuidanceLogic, TaskError, TaskOrder};
 use crate::spacecraft::logic::SpacecraftLogic;
 
 const SEED: u64 = 4;
@@ -32,14 +33,36 @@ fn satellite(model: &Model) -> Spacecraft {
 #[test]
 fn two_nodes_fly_what_the_environment_flies() {
     for errors in ["none", "noise", "torque-10%,inertia+5%,noise,delay"] {
-        let flown = compare(&errors.parse().unwrap());
+        let flown = compare(model(), &errors.parse().unwrap(), 0.5).len();
         assert!(flown > 20, "{errors}: only {flown} tasks");
     }
 }
 
-fn compare(errors: &PlantErrors) -> u64 {
-    let model = model();
-    let config = EpisodeConfig { orbits: 0.5, ..EpisodeConfig::evaluation() };
+/// The same where power, data and momentum have bounds: what is done besides turning comes with the commands.
+#[test]
+fn two_nodes_live_as_the_environment_lives() {
+    for (profile, battery_initial) in [(Profile::Minisat, 0.3), (Profile::Bsk, 0.4), (Profile::Bsk, 1.0)] {
+        let resources = ResourcesConfig { battery_initial, ..ResourcesConfig::of(profile) };
+        let config = SimConfig { resources: Some(Box::new(resources)), ..SimConfig::default() };
+        let model = Model::new(config).unwrap();
+        for errors in ["none", "noise,delay"] {
+            let duties = compare(model.clone(), &errors.parse().unwrap(), 2.0);
+            let has = |wanted: Option<Duty>| duties.contains(&wanted);
+            assert!(has(None) && has(Some(Duty::Charge)), "{profile:?} {battery_initial} {errors}: {duties:?}");
+            let tasks = has(Some(Duty::Downlink)) && has(Some(Duty::Desaturate));
+            assert_eq!(tasks, profile == Profile::Bsk, "{battery_initial} {errors}: {duties:?}");
+        }
+    }
+}
+
+fn give(spacecraft: &mut SpacecraftLogic, command: &Command) {
+    let activity = command.activity.unwrap_or_default();
+    spacecraft.command(command.tick, command.guidance.torque, activity).unwrap();
+}
+
+/// What was done in each task beside imaging and waiting.
+fn compare(model: Model, errors: &PlantErrors, orbits: f64) -> Vec<Option<Duty>> {
+    let config = EpisodeConfig { orbits, ..EpisodeConfig::evaluation() };
     let mut env = Env::episode(Arc::new(model.clone()), &config, SEED);
     env.differ(errors, SEED).unwrap();
     let mut satellite = satellite(&model);
@@ -50,7 +73,7 @@ fn compare(errors: &PlantErrors) -> u64 {
     let mut planner = Heuristic { t_pre_s: 60.0 };
     let mut expected = None;
     let mut states = VecDeque::from([spacecraft.sample()]);
-    let mut over = false;
+    let (mut over, mut duties) = (false, Vec::new());
     while !over {
         let mut effects = VecDeque::new();
         if spacecraft.ready() && !spacecraft.done() {
@@ -62,16 +85,17 @@ fn compare(errors: &PlantErrors) -> u64 {
         while let Some(effect) = effects.pop_front() {
             match effect {
                 Effect::Strike => unreachable!("nothing was ordered"),
-                Effect::Command(command) => spacecraft.command(command.tick, command.guidance.torque).unwrap(),
+                Effect::Command(command) => give(&mut spacecraft, &command),
                 Effect::Decide(point) => {
                     over = point.mission_over;
-                    let decision = planner.decide(&env.context()).unwrap();
+                    let decision = env.decide(&mut planner).unwrap();
                     assert_eq!(&point.situation, env.context().situation);
                     assert_eq!(point.finished.as_ref().map(|finished| &finished.record), expected.as_ref());
                     if over {
                         break;
                     }
                     let kind = decision.to_task(&env.context()).unwrap();
+                    duties.push(kind.duty());
                     let order = TaskOrder { task: point.task, kind, name: "strip".to_owned() };
                     expected = Some(env.fly(decision, env.horizon()).unwrap().record);
                     effects.extend(guidance.on_task(order).unwrap());
@@ -81,7 +105,8 @@ fn compare(errors: &PlantErrors) -> u64 {
     }
     assert!(env.truncated());
     assert_eq!((spacecraft.missed, guidance.late), (0, 0));
-    guidance.kept().task
+    assert_eq!(spacecraft.sample().resources.as_ref(), env.onboard().map(|onboard| onboard.state()));
+    duties
 }
 
 #[test]
@@ -113,7 +138,7 @@ fn a_task_is_given_up_while_slewing_and_not_once_imaging_has_begun() {
         let mut sample = |guidance: &mut GuidanceLogic| {
             let effects = guidance.on_state(spacecraft.advance());
             if let Some(Effect::Command(command)) = effects.first() {
-                spacecraft.command(command.tick, command.guidance.torque).unwrap();
+                give(&mut spacecraft, command);
             }
             effects
         };

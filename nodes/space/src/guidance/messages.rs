@@ -4,10 +4,11 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use swath_msgs::swath_msgs as msg;
 use swath_node::error::MessageError;
+use swath_node::messages::activity::activity_message;
 use swath_node::messages::numbers::vector3;
 use swath_node::messages::spacecraft_state::spacecraft_state;
 use swath_node::messages::strip::acquisition;
-use swath_node::messages::task_result::task_record;
+use swath_node::messages::task_result::{duty, kind_without_strip, task_record};
 use swath_node::stamp::{BODY_FRAME, Stamper};
 use swath_sim::task::{FailureReason, Task};
 use swath_sim::vehicle::model::Model;
@@ -27,7 +28,12 @@ pub fn task_order(model: &Model, message: &msg::ImagingTask) -> Result<TaskOrder
             (Task::Image { id, strip, t_pre, t_acq }, message.strip.name.clone())
         }
         msg::ImagingTask::KIND_WAIT => (Task::Wait { ticks: message.wait_ticks }, String::new()),
-        value => return Err(MessageError::Constant { field: "kind", value }),
+        value => {
+            // Duties need resources.
+            let resources = model.config.resources.as_ref();
+            let duty = resources.and_then(|_| duty(value)).ok_or(MessageError::Constant { field: "kind", value })?;
+            (Task::Serve { duty, ticks: message.wait_ticks }, String::new())
+        }
     };
     Ok(TaskOrder { task: message.task, kind, name })
 }
@@ -46,6 +52,7 @@ pub fn wheel_torque(stamper: &Stamper, command: &Command) -> msg::WheelTorque {
         omega_br_b: vector3(&guidance.error.omega_BR_B),
         attitude_error: guidance.error.sigma_BR.norm(),
         elevation: guidance.elevation(),
+        activity: command.activity.iter().map(activity_message).collect::<Vec<_>>(),
     }
 }
 
@@ -92,7 +99,7 @@ pub fn task_result(finished: &FinishedTask) -> msg::TaskResult {
         task: record.task,
         start_tick: record.start.0,
         end_tick: record.end.0,
-        kind: if record.strip.is_some() { msg::ImagingTask::KIND_IMAGE } else { msg::ImagingTask::KIND_WAIT },
+        kind: record.strip.map_or(kind_without_strip(record.duty), |_| msg::ImagingTask::KIND_IMAGE),
         strip_id: record.strip.map_or(0, |id| id.0),
         strip_name: finished.name.clone(),
         t_pre_ticks: record.t_pre,

@@ -15,7 +15,7 @@ use swath_sim::vehicle::spacecraft::StateSample;
 use super::logic::{Command, Effect, GuidanceLogic, Lost};
 use super::messages;
 use super::radio::RadioGate;
-use swath_mission::alarms::conditions::{back, of_health};
+use swath_mission::alarms::conditions::{back, of_health, of_resources};
 use swath_mission::faults::grammar::Process;
 use swath_mission::faults::plan::Scheduled;
 use swath_mission::file::PACED_PATIENCE;
@@ -92,6 +92,8 @@ struct GuidanceNode {
     kept: Option<(u64, bool)>,
     /// Whether something was wrong with wheels or sensors before.
     health_told: bool,
+    /// The same of power, data and momentum.
+    resources_told: bool,
     /// States before are old.
     since: Tick,
     /// Whether it commanded nothing since it last flew.
@@ -136,6 +138,7 @@ impl GuidanceNode {
             kept: None,
             // What the one before has told may be over.
             health_told: base.goes_on(),
+            resources_told: base.goes_on(),
             since: base.stamper.tick_from(&base.node.clock().stamp()),
             rested: false,
             base,
@@ -278,6 +281,17 @@ impl GuidanceNode {
         Ok(())
     }
 
+    /// Tells how power, data and momentum stand at a decision; nothing as long as nothing was ever wrong.
+    fn tell_resources(&mut self, state: &StateSample) -> Result<()> {
+        let told = state.resources.iter().zip(&self.base.model.config.resources);
+        let reports: Vec<_> = told.flat_map(|(it, config)| of_resources(state.tick, it, config)).collect();
+        self.resources_told |= reports.iter().any(|report| report.wrong);
+        if self.resources_told {
+            reports.iter().try_for_each(|report| self.base.condition(report))?;
+        }
+        Ok(())
+    }
+
     fn take_task(&mut self, message: &msg::ImagingTask) -> Result<()> {
         // An answer given twice, or after its deadline, is nothing new.
         if self.logic.wanted() != Some(message.task) {
@@ -325,6 +339,7 @@ impl GuidanceNode {
             match effect {
                 Effect::Command(command) => self.send(&command)?,
                 Effect::Decide(point) => {
+                    self.tell_resources(&point.state)?;
                     let message = messages::decision_point(&self.base.stamper, &point);
                     self.points.publish(&message)?;
                     self.last_point = Some(message.clone());

@@ -1,5 +1,6 @@
 //! The radio channel as a node, without ROS: ticks of the radio in turn, each heard by both ends before the next one.
 
+use swath_mission::faults::FaultPlan;
 use swath_mission::link::channel::Channel;
 use swath_mission::link::end::Sent;
 use swath_mission::link::radio::Direction;
@@ -58,6 +59,11 @@ impl LinkLogic {
         };
         logic.come_to(Tick(0));
         logic
+    }
+
+    /// The faults of the mission are these from now on.
+    pub fn disturb(&mut self, faults: &FaultPlan) {
+        self.channel.radio_mut().disturb(faults);
     }
 
     /// What an end should hear now; `direction` is that of the frames it hears. The ground, which may not know more than

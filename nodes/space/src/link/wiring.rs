@@ -103,6 +103,13 @@ impl LinkNode {
         if !self.logic.awaits(direction, tick) {
             return Ok(());
         }
+        if self.base.take_fault_orders()? {
+            self.logic.disturb(&self.base.mission.faults);
+        }
+        // Both ends say again what is not kept here.
+        if self.base.strikes_at().is_some_and(|at| tick >= at) {
+            self.base.strike();
+        }
         let kept = Kept { up, sent };
         if let Some(journal) = &mut self.journal {
             journal.add(&kept)?;

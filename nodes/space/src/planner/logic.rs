@@ -1,6 +1,6 @@
 //! The planner node without ROS: it decides when both the situation and the candidates of a task are known.
 
-use swath_sim::planner::{Decision, DecisionContext, Planner, Rationale};
+use swath_sim::planner::{Decision, DecisionContext, Planner, Rationale, Shield, decide};
 use swath_sim::requests::catalogue::Candidate;
 use swath_sim::task::{Task, TaskRecord};
 use swath_sim::vehicle::flight::Situation;
@@ -40,6 +40,8 @@ pub struct Planned {
 pub struct PlannerLogic {
     model: Model,
     planner: GatedPlanner,
+    /// What keeps the planner from what the battery does not last for.
+    shield: Option<Shield>,
     point: Option<(u64, Situation, Option<TaskRecord>)>,
     upcoming: Option<Upcoming>,
     decided: Option<u64>,
@@ -49,7 +51,7 @@ impl PlannerLogic {
     /// A planner node around a planner.
     #[must_use]
     pub fn new(model: Model, planner: GatedPlanner) -> Self {
-        Self { model, planner, point: None, upcoming: None, decided: None }
+        Self { shield: Shield::new(&model), model, planner, point: None, upcoming: None, decided: None }
     }
 
     /// A task is wanted; `previous` is the one that ended here.
@@ -101,7 +103,7 @@ impl PlannerLogic {
         let candidates = &upcoming.candidates;
         let (previous, model) = (previous.as_ref(), &self.model);
         let context = DecisionContext { task, situation: &situation, candidates, previous, model };
-        let decision = self.planner.decide(&context).ok()?;
+        let decision = decide(self.shield.as_ref(), &context, &mut self.planner).ok()?;
         let kind = decision.to_task(&context).ok()?;
         self.decided = Some(task);
         Some(Planned {

@@ -3,6 +3,7 @@
 use swath_msgs::swath_msgs as msg;
 use swath_node::error::MessageError;
 use swath_node::messages::strip::acquisition;
+use swath_node::messages::task_result::kind_without_strip;
 use swath_node::orders::mode_number;
 use swath_node::stamp::{EARTH_FRAME, Stamper};
 use swath_sim::planner::Decision;
@@ -54,7 +55,7 @@ pub fn imaging_task(stamper: &Stamper, planned: &Planned, strips: &[msg::Candida
             task.t_acq_ticks = t_acq;
         }
         (_, kind) => {
-            task.kind = msg::ImagingTask::KIND_WAIT;
+            task.kind = kind_without_strip(kind.duty());
             task.wait_ticks = kind.ticks();
         }
     }

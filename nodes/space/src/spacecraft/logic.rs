@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::TimedFault;
+use swath_sim::vehicle::resources::Activity;
 use swath_sim::vehicle::spacecraft::{Spacecraft, StateSample};
 use thiserror::Error;
 
@@ -29,12 +31,23 @@ pub enum CommandError {
     },
 }
 
+/// What acts over a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Acting {
+    /// Torque commanded from the state before the last one [N m].
+    pub torque: Vector3<f64>,
+    /// What is done besides turning, commanded from the last state, where resources have bounds.
+    pub activity: Option<Activity>,
+}
+
 /// The spacecraft and the commands that it has not used yet.
 #[derive(Clone, Debug)]
 pub struct SpacecraftLogic {
     spacecraft: Spacecraft,
     horizon: Tick,
-    commands: BTreeMap<Tick, Vector3<f64>>,
+    commands: BTreeMap<Tick, (Vector3<f64>, Activity)>,
+    /// What was done over the last tick; it goes on where no command has come.
+    activity: Activity,
     /// From which state on there is no guidance by order, and from which on there is one again.
     without: Vec<(Tick, Tick)>,
     /// Ticks flown without a command because none had come in time.
@@ -45,7 +58,8 @@ impl SpacecraftLogic {
     /// A spacecraft that stops at `horizon`.
     #[must_use]
     pub fn new(spacecraft: Spacecraft, horizon: Tick) -> Self {
-        Self { spacecraft, horizon, commands: BTreeMap::new(), without: Vec::new(), missed: 0 }
+        let (commands, activity) = (BTreeMap::new(), Activity::default());
+        Self { spacecraft, horizon, commands, activity, without: Vec::new(), missed: 0 }
     }
 
     /// Between these ticks there is no guidance, by order: the wheels hold no torque where it would have commanded.
@@ -79,7 +93,7 @@ impl SpacecraftLogic {
     ///
     /// # Errors
     /// When the command is not finite or belongs to a state that was not sent yet.
-    pub fn command(&mut self, tick: Tick, torque: Vector3<f64>) -> Result<(), CommandError> {
+    pub fn command(&mut self, tick: Tick, torque: Vector3<f64>, activity: Activity) -> Result<(), CommandError> {
         if !torque.iter().all(|component| component.is_finite()) {
             return Err(CommandError::NotFinite { tick, torque: torque.into() });
         }
@@ -88,18 +102,18 @@ impl SpacecraftLogic {
             return Err(CommandError::FromTheFuture { tick, now });
         }
         if tick.after(1) >= now {
-            self.commands.insert(tick, torque);
+            self.commands.insert(tick, (torque, activity));
         }
         Ok(())
     }
 
-    /// Whether the command that the next tick needs has come: that of the tick before this one.
+    /// Whether the commands that the next tick needs have come: that of the state before this one for its torque, and where
+    /// resources have bounds that of this one for what else is done.
     #[must_use]
     pub fn ready(&self) -> bool {
-        match self.now().0.checked_sub(1).map(Tick) {
-            Some(before) => self.commands.contains_key(&before) || self.is_without(before),
-            None => true,
-        }
+        let has_come = |tick: &Tick| self.commands.contains_key(tick) || self.is_without(*tick);
+        let before = self.now().0.checked_sub(1).map(Tick);
+        before.as_ref().is_none_or(has_come) && (self.spacecraft.onboard().is_none() || has_come(&self.now()))
     }
 
     fn is_without(&self, tick: Tick) -> bool {
@@ -109,27 +123,40 @@ impl SpacecraftLogic {
     /// Integrates one tick. The wheels idle when no command has come: the first tick has none, and in a paced mission
     /// guidance may be late.
     pub fn advance(&mut self) -> StateSample {
-        let command = self.next_command();
-        self.advance_by(&command)
+        let acting = self.next_command();
+        self.advance_by(&acting)
     }
 
-    /// What acts over the next tick: the command that came for it, else nothing [N m].
-    pub fn next_command(&mut self) -> Vector3<f64> {
+    /// What acts over the next tick: the commands that came for it; without one the wheels hold no torque.
+    pub fn next_command(&mut self) -> Acting {
         let now = self.now();
         let before = now.0.checked_sub(1).map(Tick);
         let command = before.filter(|&before| !self.is_without(before)).map(|before| {
-            self.commands.remove(&before).unwrap_or_else(|| {
-                self.missed += 1;
-                Vector3::zeros()
-            })
+            let command = self.commands.remove(&before).map(|(torque, _)| torque);
+            self.missed += u64::from(command.is_none());
+            command.unwrap_or_default()
         });
         self.commands = self.commands.split_off(&now);
-        command.unwrap_or_default()
+        Acting {
+            torque: command.unwrap_or_default(),
+            activity: self.spacecraft.onboard().map(|_| self.next_activity()),
+        }
     }
 
-    /// Integrates one tick under a command [N m].
-    pub fn advance_by(&mut self, command: &Vector3<f64>) -> StateSample {
-        self.spacecraft.advance(command);
+    /// What is done over the next tick: what came for it, nothing without guidance, else what was done before.
+    fn next_activity(&self) -> Activity {
+        let now = self.now();
+        match self.commands.get(&now) {
+            Some((_, activity)) => *activity,
+            None if self.is_without(now) => Activity::default(),
+            None => Activity { image_worth: None, ..self.activity },
+        }
+    }
+
+    /// Integrates one tick.
+    pub fn advance_by(&mut self, acting: &Acting) -> StateSample {
+        self.activity = acting.activity.unwrap_or_default();
+        self.spacecraft.advance_doing(&acting.torque, self.activity);
         self.sample()
     }
 }
@@ -154,7 +181,7 @@ mod tests {
         let mut spacecraft = spacecraft();
         assert!(spacecraft.ready());
         let torque = Vector3::new(0.1, -0.2, 0.3);
-        spacecraft.command(Tick(0), torque).unwrap();
+        spacecraft.command(Tick(0), torque, Activity::default()).unwrap();
         assert_eq!(spacecraft.advance().torque_applied, Vector3::zeros());
         assert!(spacecraft.ready());
         assert_eq!(spacecraft.advance().torque_applied, torque);
@@ -169,7 +196,7 @@ mod tests {
         let mut spacecraft = spacecraft();
         spacecraft.set_without_guidance(vec![(Tick(1), Tick(3))]);
         let torque = Vector3::new(0.1, -0.2, 0.3);
-        spacecraft.command(Tick(0), torque).unwrap();
+        spacecraft.command(Tick(0), torque, Activity::default()).unwrap();
         spacecraft.advance();
         assert_eq!(spacecraft.advance().torque_applied, torque);
         for now in [2, 3] {
@@ -185,12 +212,14 @@ mod tests {
     fn commands_that_make_no_sense_are_refused() {
         let mut spacecraft = spacecraft();
         let nan = Vector3::new(f64::NAN, 0.0, 0.0);
-        assert!(matches!(spacecraft.command(Tick(0), nan), Err(CommandError::NotFinite { .. })));
-        assert!(matches!(spacecraft.command(Tick(1), Vector3::zeros()), Err(CommandError::FromTheFuture { .. })));
+        let none = Activity::default();
+        assert!(matches!(spacecraft.command(Tick(0), nan, none), Err(CommandError::NotFinite { .. })));
+        let early = spacecraft.command(Tick(1), Vector3::zeros(), none);
+        assert!(matches!(early, Err(CommandError::FromTheFuture { .. })));
         for _ in 0..5 {
             spacecraft.advance();
         }
-        spacecraft.command(Tick(1), Vector3::zeros()).unwrap();
+        spacecraft.command(Tick(1), Vector3::zeros(), none).unwrap();
         assert!(!spacecraft.ready(), "a command that came too late is not used");
     }
 }

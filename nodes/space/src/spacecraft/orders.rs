@@ -61,6 +61,9 @@ impl OrderDesk {
         let (horizon, period) = (base.horizon, base.model.period);
         let mut plan = base.mission.faults.clone();
         let (order, scheduled) = plan.take_order(&call.fault, &call.actor, now, horizon, period)?;
+        if base.mission.link.is_none() {
+            plan.fits_no_radio()?;
+        }
         let all: Vec<Ordered> = self.taken.iter().cloned().chain([order.clone()]).collect();
         if !base.keep_fault_orders(&all)? {
             bail!("there is no room to keep it, and what is not kept is not ordered");

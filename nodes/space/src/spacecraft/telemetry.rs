@@ -1,18 +1,22 @@
-//! The spacecraft in standard messages, for ROS tools: frames, wheels, sub-satellite point.
+//! The spacecraft for ROS tools, in standard messages where one fits: frames, wheels, sub-satellite point, resources.
 
 use anyhow::Result;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use swath_msgs::geometry_msgs::{Quaternion, Transform, TransformStamped};
-use swath_msgs::sensor_msgs::{JointState, NavSatFix, NavSatStatus};
+use swath_msgs::sensor_msgs::{BatteryState, JointState, NavSatFix, NavSatStatus};
+use swath_msgs::std_msgs::Header;
+use swath_msgs::swath_msgs as msg;
 use swath_msgs::tf2_msgs::TFMessage;
 use swath_ros::{Parameters, Publisher, Spec, graph};
 use swath_sim::vehicle::mrp;
 use swath_sim::world::frames::latitude_longitude_deg;
 
 use swath_node::messages::numbers::vector3;
+use swath_node::messages::resource_state::resource_message;
 use swath_node::node::MissionNode;
 use swath_node::program::Parameter;
 use swath_node::stamp::{BODY_FRAME, EARTH_FRAME, INERTIAL_FRAME, ORBIT_FRAME};
+use swath_sim::vehicle::resources::{Failure, ResourceState};
 use swath_sim::vehicle::spacecraft::StateSample;
 
 /// How often.
@@ -27,6 +31,8 @@ pub struct Telemetry {
     frames: Publisher<TFMessage>,
     wheels: Publisher<JointState>,
     sub_satellite: Publisher<NavSatFix>,
+    /// There are none where resources have no bounds.
+    resources: Option<(Publisher<BatteryState>, Publisher<msg::ResourceState>)>,
 }
 
 impl Telemetry {
@@ -49,6 +55,10 @@ impl Telemetry {
             frames: base.node.publisher(&graph::TF)?,
             wheels: base.node.publisher(&graph::WHEELS)?,
             sub_satellite: base.node.publisher(&graph::SUB_SATELLITE_POINT)?,
+            resources: match base.model.config.resources {
+                Some(_) => Some((base.node.publisher(&graph::BATTERY)?, base.node.publisher(&graph::RESOURCES)?)),
+                None => None,
+            },
         })
     }
 
@@ -83,7 +93,42 @@ impl Telemetry {
             ..NavSatFix::default()
         };
         fix.status.status = NavSatStatus::STATUS_FIX;
-        Ok(self.sub_satellite.publish(&fix)?)
+        self.sub_satellite.publish(&fix)?;
+        if let (Some((battery, resources)), Some(state)) = (&self.resources, &sample.resources) {
+            battery.publish(&battery_state(base.stamper.header(sample.tick, BODY_FRAME), state))?;
+            resources.publish(&resource_message(&base.stamper, sample.tick, state))?;
+        }
+        Ok(())
+    }
+}
+
+/// The battery as ROS tools know batteries. The bus has no voltage here, so there is no charge in A h either.
+fn battery_state(header: Header, state: &ResourceState) -> BatteryState {
+    let status = if state.charge_j >= state.capacity_j {
+        BatteryState::POWER_SUPPLY_STATUS_FULL
+    } else if state.generated_w > state.asked_w {
+        BatteryState::POWER_SUPPLY_STATUS_CHARGING
+    } else {
+        BatteryState::POWER_SUPPLY_STATUS_DISCHARGING
+    };
+    let health = match state.safe_mode {
+        Some(Failure::BatteryEmpty) => BatteryState::POWER_SUPPLY_HEALTH_DEAD,
+        _ => BatteryState::POWER_SUPPLY_HEALTH_GOOD,
+    };
+    BatteryState {
+        header,
+        voltage: f32::NAN,
+        temperature: f32::NAN,
+        current: f32::NAN,
+        charge: f32::NAN,
+        capacity: f32::NAN,
+        design_capacity: f32::NAN,
+        percentage: state.level() as f32,
+        power_supply_status: status,
+        power_supply_health: health,
+        power_supply_technology: BatteryState::POWER_SUPPLY_TECHNOLOGY_UNKNOWN,
+        present: true,
+        ..BatteryState::default()
     }
 }
 

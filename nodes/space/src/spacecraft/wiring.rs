@@ -4,14 +4,14 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use nalgebra::Vector3;
 use swath_msgs::rosgraph_msgs::Clock;
 use swath_msgs::swath_msgs::{SpacecraftState, WheelTorque};
+use swath_node::messages::activity::activity;
 use swath_node::messages::spacecraft_state::spacecraft_state;
 use swath_ros::{Publisher, RosError, Spec, Subscription, graph};
 use swath_sim::time::Tick;
 
-use super::logic::SpacecraftLogic;
+use super::logic::{Acting, SpacecraftLogic};
 use super::orders::OrderDesk;
 use super::telemetry::{self, Telemetry};
 use crate::journal::Journal;
@@ -276,8 +276,13 @@ impl SpacecraftNode {
 
     fn take_commands(&mut self) -> Result<()> {
         while let Some(message) = self.commands.take()? {
-            if let Err(error) = self.logic.command(Tick(message.tick), message.torque.into()) {
-                self.base.alarm(Severity::Error, "command refused", &error.to_string())?;
+            let activity = message.activity.first().map(activity).transpose().map_err(|error| error.to_string());
+            let taken = activity.and_then(|activity| {
+                let taken = self.logic.command(Tick(message.tick), message.torque.into(), activity.unwrap_or_default());
+                taken.map_err(|error| error.to_string())
+            });
+            if let Err(error) = taken {
+                self.base.alarm(Severity::Error, "command refused", &error)?;
             }
         }
         Ok(())
@@ -377,9 +382,9 @@ fn without_guidance(base: &MissionNode) -> Vec<(Tick, Tick)> {
     lost.iter().map(|(it, _)| (it.from, back(it))).collect()
 }
 
-/// The commands that were flown [N m], kept so that a spacecraft that is started again goes on where the one before was: the
+/// What was flown, kept so that a spacecraft that is started again goes on where the one before was: the
 /// state follows from them.
-type Commands = Journal<Vector3<f64>>;
+type Commands = Journal<Acting>;
 /// Their file.
 const JOURNAL: &str = "spacecraft.commands";
 

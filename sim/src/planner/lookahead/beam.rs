@@ -2,6 +2,7 @@
 
 use super::super::decision::{Decision, DecisionContext, Planner, PlannerError, wait_for_a_window};
 use super::experience::{Allowance, Experience};
+use super::meter::Prices;
 use super::search::Search;
 use crate::requests::catalogue::Candidate;
 use crate::vehicle::flight::Situation;
@@ -42,7 +43,7 @@ pub struct Sequence {
     pub ends: Vec<u32>,
     /// Transition of the first task [ticks].
     pub first_t_pre: u32,
-    /// Sum of the priorities.
+    /// Sum of the priorities, less what energy and data cost.
     pub reward: f64,
     /// Time that it takes [ticks].
     pub elapsed: u32,
@@ -56,13 +57,14 @@ impl Sequence {
     }
 
     /// Priority per tick.
-    fn ratio(&self) -> f64 {
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
         self.reward / f64::from(self.elapsed)
     }
 
-    /// Greatest ratio that imaging one more candidate could give.
-    fn bound(&self, candidate: &Candidate, earliest: u32) -> f64 {
-        (self.reward + candidate.strip.priority) / f64::from(self.elapsed + earliest + candidate.t_acq)
+    /// Greatest ratio that imaging one more candidate of some worth could give.
+    fn bound(&self, candidate: &Candidate, worth: f64, earliest: u32) -> f64 {
+        (self.reward + worth) / f64::from(self.elapsed + earliest + candidate.t_acq)
     }
 }
 
@@ -77,6 +79,10 @@ impl Beam {
 impl Planner for Beam {
     fn name(&self) -> String {
         "beam".to_owned()
+    }
+
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
     }
 
     fn forget(&mut self) {
@@ -104,11 +110,17 @@ impl BeamSearch {
     #[must_use]
     pub fn sequences(&self, context: &DecisionContext<'_>, allowance: &Allowance) -> Vec<Sequence> {
         let mut search = Search::new(context.model, context.situation, allowance);
+        self.priced(&mut search, context.candidates, &Prices::default())
+    }
+
+    /// The same where energy and data have a price; `search` measures energy where that is not nothing.
+    #[must_use]
+    pub fn priced(&self, search: &mut Search<'_>, candidates: &[Candidate], prices: &Prices) -> Vec<Sequence> {
         let mut beam = vec![Sequence::new(search.begin)];
         for _ in 0..self.depth {
             let mut next = Vec::new();
             for sequence in &beam {
-                self.extend(&mut search, context.candidates, sequence, &mut next);
+                self.extend(search, (candidates, prices), sequence, &mut next);
             }
             if next.is_empty() {
                 break;
@@ -120,15 +132,21 @@ impl BeamSearch {
     }
 
     /// Adds the best continuations of a sequence to `next`, which stays sorted and no longer than the beam is wide.
-    fn extend(&self, search: &mut Search<'_>, candidates: &[Candidate], so_far: &Sequence, next: &mut Vec<Sequence>) {
-        for (bound, i) in order(search, candidates, so_far) {
+    fn extend(
+        &self,
+        search: &mut Search<'_>,
+        (candidates, prices): (&[Candidate], &Prices),
+        so_far: &Sequence,
+        next: &mut Vec<Sequence>,
+    ) {
+        for (bound, i) in order(search, (candidates, prices), so_far) {
             let out_of_budget = search.ticks >= self.budget && !next.is_empty();
             let floor = next.get(self.width - 1).map_or(0.0, Sequence::ratio);
             if bound <= floor || out_of_budget {
                 break;
             }
             let candidate = &candidates[i];
-            let reward = so_far.reward + candidate.strip.priority;
+            let reward = so_far.reward + worth(search, candidate, prices);
             // A longer transition would give a lower ratio than that of the last sequence kept.
             let affordable = if floor > 0.0 { (reward / floor) as u32 } else { u32::MAX };
             let longest = affordable.saturating_sub(so_far.elapsed + candidate.t_acq);
@@ -138,7 +156,7 @@ impl BeamSearch {
                 longer.first_t_pre = found.t_pre;
             }
             longer.imaged.push(i);
-            longer.reward = reward;
+            longer.reward = reward - prices.joule * found.taken_j;
             longer.elapsed += found.t_pre + candidate.t_acq;
             longer.ends.push(longer.elapsed);
             longer.end = found.end;
@@ -149,14 +167,20 @@ impl BeamSearch {
     }
 }
 
+/// Priority of a candidate, less what its data cost.
+fn worth(search: &Search<'_>, candidate: &Candidate, prices: &Prices) -> f64 {
+    let bits = search.meter().map_or(0.0, |meter| meter.bits(candidate.t_acq));
+    if bits > prices.room { 0.0 } else { candidate.strip.priority - prices.bit * bits }
+}
+
 /// Candidates that a sequence could go on with, the most promising first, with the greatest ratio that each could give.
-fn order(search: &Search<'_>, candidates: &[Candidate], so_far: &Sequence) -> Vec<(f64, usize)> {
+fn order(search: &Search<'_>, (candidates, prices): (&[Candidate], &Prices), so_far: &Sequence) -> Vec<(f64, usize)> {
     let is_paid = |i: usize| so_far.imaged.iter().any(|&j| i == j || candidates[i].twin == Some(candidates[j].id));
     let left = candidates.iter().enumerate().filter(|(i, _)| !is_paid(*i));
     let mut order: Vec<(f64, usize)> = left
         .filter_map(|(i, candidate)| {
             let (earliest, _) = search.starts(so_far.end.now, candidate)?;
-            Some((so_far.bound(candidate, earliest), i))
+            Some((so_far.bound(candidate, worth(search, candidate, prices), earliest), i))
         })
         .collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

@@ -129,6 +129,7 @@ mod tests {
             start,
             end: start.after(t_pre),
             strip: Some(context.candidates[0].id),
+            duty: None,
             t_pre,
             t_acq: 0,
             outcome: TaskOutcome { failure, ..TaskOutcome::NOT_BEGUN },

@@ -28,6 +28,10 @@ impl Planner for Lookahead {
         self.experience.margin().map_or_else(|| "lookahead".to_owned(), |ticks| format!("lookahead:{ticks}"))
     }
 
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn forget(&mut self) {
         self.experience.forget();
     }

@@ -1,8 +1,9 @@
 //! The shortest transition with which a strip is imaged, found by flying it.
 
 use super::experience::Allowance;
+use super::meter::Meter;
 use crate::requests::catalogue::Candidate;
-use crate::task::Task;
+use crate::task::{Duty, Task};
 use crate::time::Tick;
 use crate::vehicle::flight::{Flight, Situation};
 use crate::vehicle::model::Model;
@@ -24,6 +25,7 @@ pub struct Search<'a> {
     pub begin: Situation,
     /// Closed-loop ticks flown so far.
     pub ticks: u64,
+    meter: Option<Meter>,
 }
 
 /// A task that succeeds when it is flown in the head.
@@ -33,6 +35,8 @@ pub struct Found {
     pub t_pre: u32,
     /// Where it ends.
     pub end: Situation,
+    /// What it takes of energy [J], where that is measured; see [`Meter`].
+    pub taken_j: f64,
 }
 
 impl<'a> Search<'a> {
@@ -49,7 +53,40 @@ impl<'a> Search<'a> {
             begin = flight.situation();
         }
         let sigma_max = model.config.imaging.sigma_max;
-        Self { model, flight, margin: allowance.ticks, sigma_max, begin, ticks: u64::from(allowance.delay) }
+        let (margin, ticks) = (allowance.ticks, u64::from(allowance.delay));
+        Self { model, flight, margin, sigma_max, begin, ticks, meter: None }
+    }
+
+    /// The same, measuring what flights take of energy, where that has bounds.
+    #[must_use]
+    pub fn metered(mut self) -> Self {
+        self.meter = Meter::new(self.model);
+        self
+    }
+
+    /// What measures energy, if something does.
+    #[must_use]
+    pub fn meter(&self) -> Option<&Meter> {
+        self.meter.as_ref()
+    }
+
+    /// Flies a duty from a situation: what it takes of energy up to each of some times [J]; 0 where nothing is measured.
+    pub fn serve<const N: usize>(&mut self, from: &Situation, duty: Duty, ticks: [u32; N]) -> [f64; N] {
+        let Some(meter) = &self.meter else { return [0.0; N] };
+        self.flight.rewind(from);
+        let longest = ticks.into_iter().max().unwrap_or(0);
+        self.ticks += u64::from(longest);
+        let (mut flown, mut turning_j, mut taken) = (0, 0.0, [0.0; N]);
+        self.flight.fly_showing(Task::Serve { duty, ticks: longest }, |spacecraft| {
+            flown += 1;
+            turning_j += meter.turning_j(spacecraft);
+            for (taken, &ticks) in taken.iter_mut().zip(&ticks) {
+                if ticks == flown {
+                    *taken = turning_j + meter.still_j(&Task::Serve { duty, ticks });
+                }
+            }
+        });
+        taken
     }
 
     /// Shortest and longest transition after which the candidate's window is open [ticks].
@@ -100,8 +137,8 @@ impl<'a> Search<'a> {
             guess = next;
         }
         let t_pre = found?;
-        let end = self.image(from, candidate, t_pre)?;
-        Some(Found { t_pre, end })
+        let (end, taken_j) = self.image(from, candidate, t_pre)?;
+        Some(Found { t_pre, end, taken_j })
     }
 
     /// Ticks after which the attitude error stays within its limit, in a flight with this transition; `None` when it is
@@ -123,13 +160,20 @@ impl<'a> Search<'a> {
         (settled <= latest).then_some(settled)
     }
 
-    /// Where the whole task ends, if it succeeds.
-    pub fn image(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32) -> Option<Situation> {
+    /// Where the whole task ends and what it takes of energy [J], if it succeeds.
+    pub fn image(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32) -> Option<(Situation, f64)> {
         self.flight.rewind(from);
         let task = Task::Image { id: candidate.id, strip: candidate.strip, t_pre, t_acq: candidate.t_acq };
         self.ticks += u64::from(task.ticks());
-        let outcome = self.flight.fly(task, Tick(u64::MAX));
-        outcome.failure.is_none().then(|| self.flight.situation())
+        let (outcome, taken_j) = match &self.meter {
+            None => (self.flight.fly(task, Tick(u64::MAX)), 0.0),
+            Some(meter) => {
+                let mut taken_j = meter.still_j(&task);
+                let outcome = self.flight.fly_showing(task, |spacecraft| taken_j += meter.turning_j(spacecraft));
+                (outcome, taken_j)
+            }
+        };
+        outcome.failure.is_none().then(|| (self.flight.situation(), taken_j))
     }
 
     fn begin(&mut self, from: &Situation, candidate: &Candidate, t_pre: u32) {

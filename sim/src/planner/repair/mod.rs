@@ -142,6 +142,10 @@ impl Planner for Repair {
         format!("repair{}", self.desk.method.ending())
     }
 
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn forget(&mut self) {
         self.desk.forget();
         self.experience.forget();
@@ -212,6 +216,10 @@ fn flown(model: &Model, context: &DecisionContext<'_>, plan: &[(usize, Tick)]) -
 impl Planner for Aspen {
     fn name(&self) -> String {
         format!("aspen{}", self.desk.method.ending())
+    }
+
+    fn fork(&self) -> Option<Box<dyn Planner + Send>> {
+        Some(Box::new(self.clone()))
     }
 
     fn forget(&mut self) {

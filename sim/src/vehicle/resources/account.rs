@@ -1,6 +1,7 @@
 //! What a tick costs and brings: the spacecraft's power, data and momentum, and when they fail it.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::config::resources::{Antenna, Desaturation, ResourcesConfig};
 use crate::time::Tick;
@@ -9,7 +10,7 @@ use crate::vehicle::model::Model;
 use crate::vehicle::mrp::Rotation;
 use crate::vehicle::resources::battery::{Battery, SolarArray, WheelPower};
 use crate::vehicle::resources::momentum::{External, Rods, Thrusters};
-use crate::vehicle::resources::storage::{ImageFile, Storage};
+use crate::vehicle::resources::storage::Storage;
 use crate::world::contacts::{ContactPlan, View};
 use crate::world::magnetic::DipoleField;
 use crate::world::orbit::Orbit;
@@ -18,7 +19,7 @@ use crate::world::sun::Sun;
 use crate::world::turn::Turn;
 
 /// What the imager does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Imager {
     /// It is off.
     #[default]
@@ -30,7 +31,7 @@ pub enum Imager {
 }
 
 /// What the satellite does over a tick besides turning.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Activity {
     /// What the imager does.
     pub imager: Imager,
@@ -38,15 +39,36 @@ pub struct Activity {
     pub downlink: bool,
     /// Number of the tick of a desaturation.
     pub desaturate: Option<u32>,
+    /// Where a task that images has ended before this tick: what its image is worth, 0 for one that failed.
+    pub image_worth: Option<f64>,
 }
 
 /// What the satellite cannot go on without.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Failure {
     /// The loads asked for more than the battery had.
     BatteryEmpty,
     /// A wheel's momentum exceeded its limit.
     WheelMomentum,
+}
+
+/// What came to the ground, and what failed, since the epoch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Delivered {
+    /// Images whose last bit is on the ground.
+    pub strips: u64,
+    /// Sum of their strips' priorities.
+    pub reward: f64,
+    /// Times that safe mode was come into: the battery was empty or a wheel over its limit.
+    pub failures: u64,
+    /// Times that the charge fell below the battery's floor.
+    #[serde(default)]
+    pub floor_violations: u64,
+}
+
+impl Delivered {
+    /// Nothing.
+    pub const NONE: Self = Self { strips: 0, reward: 0.0, failures: 0, floor_violations: 0 };
 }
 
 /// How power and data stand at a tick.
@@ -76,8 +98,12 @@ pub struct ResourceState {
     pub sent_bits: u64,
     /// Dipole of the rods over the last tick, in B [A m²].
     pub rod_dipole_B: Vector3<f64>,
-    /// What failed last, and when.
-    pub failure: Option<(Tick, Failure)>,
+    /// Momentum of the wheel that has most [N m s].
+    pub momentum_nms: f64,
+    /// What failed and is not mended yet: until it is, the satellite only sees to that.
+    pub safe_mode: Option<Failure>,
+    /// What came to the ground, and what failed.
+    pub delivered: Delivered,
 }
 
 impl ResourceState {
@@ -114,9 +140,11 @@ pub struct Onboard {
     views: Vec<View>,
     battery: Battery,
     storage: Storage,
-    delivered: Vec<ImageFile>,
     state: ResourceState,
 }
+
+/// Share of its limit to which a wheel's momentum must fall before it counts as mended.
+const MENDED_SHARE: f64 = 0.9;
 
 /// A rate over a tick in whole bits.
 #[must_use]
@@ -164,7 +192,6 @@ impl Onboard {
             views: stations.iter().map(|it| View::new(it, &model.config, model.period)).collect(),
             contacts: ContactPlan::new(stations, &model.config, orbit, model.period),
             storage: Storage::new(config.storage_capacity_bits),
-            delivered: Vec::new(),
             state: ResourceState::at_epoch(&battery, config.storage_capacity_bits),
             battery,
             config: config.clone(),
@@ -217,19 +244,40 @@ impl Onboard {
         torque: &Vector3<f64>,
         activity: Activity,
     ) {
-        if let Imager::Records(strip) = activity.imager {
-            self.storage.record(strip, self.bits_a_tick.0);
+        if let Some(worth) = activity.image_worth {
+            self.storage.keep(worth);
+        }
+        match activity.imager {
+            Imager::Records(strip) => _ = self.storage.record(strip, self.bits_a_tick.0),
+            // What ended without a word of its worth was cut short.
+            Imager::Off | Imager::Warm => self.storage.discard(),
         }
         self.transmit(now, r_BN_N, body, activity);
         let met = self.power(r_BN_N, body, torque, activity);
         self.state.stored_bits = self.storage.stored();
         self.state.to_send_bits = self.storage.to_send();
+        self.state.momentum_nms = body.wheel_speed.amax() * plant.wheels.inertia;
+        let floor_j = self.config.battery_floor * self.state.capacity_j;
+        let was_above = self.state.charge_j >= floor_j;
         self.state.charge_j = self.battery.charge_j();
-        if body.wheel_speed.amax() * plant.wheels.inertia > self.config.wheel_momentum_max_nms {
-            self.state.failure = Some((now, Failure::WheelMomentum));
-        }
-        if !met {
-            self.state.failure = Some((now, Failure::BatteryEmpty));
+        self.state.delivered.floor_violations += u64::from(was_above && self.state.charge_j < floor_j);
+        self.mind_failures(met);
+    }
+
+    /// Comes into safe mode when the battery is empty or a wheel has failed, and out of it when that is mended.
+    fn mind_failures(&mut self, met: bool) {
+        let (state, limit) = (&mut self.state, self.config.wheel_momentum_max_nms);
+        let failed = if !met {
+            Some(Failure::BatteryEmpty)
+        } else {
+            (state.momentum_nms > limit).then_some(Failure::WheelMomentum)
+        };
+        let mended = state.level() >= self.config.battery_floor && state.momentum_nms <= MENDED_SHARE * limit;
+        if failed.is_some() {
+            state.delivered.failures += u64::from(state.safe_mode.is_none());
+            state.safe_mode = failed;
+        } else if mended {
+            state.safe_mode = None;
         }
     }
 
@@ -275,9 +323,12 @@ impl Onboard {
         if !self.state.in_contact || self.storage.to_send() == 0 || !self.heard(now, r_BN_N, body, activity) {
             return;
         }
-        let delivered = &mut self.delivered;
+        let delivered = &mut self.state.delivered;
         let order = self.config.downlink_order;
-        self.state.sent_bits = self.storage.send(self.bits_a_tick.1, order, |file| delivered.push(file));
+        self.state.sent_bits = self.storage.send(self.bits_a_tick.1, order, |file| {
+            delivered.strips += 1;
+            delivered.reward += file.worth;
+        });
     }
 
     /// Whether the antenna points at a station that is in contact.
@@ -295,19 +346,6 @@ impl Onboard {
             let line_N = view.position_N(now) - r_BN_N;
             boresight_N.dot(&line_N) >= self.cos_antenna * line_N.norm()
         })
-    }
-
-    /// An image has ended: one of worth waits for its way to the ground, others are thrown away. Says whether it waits.
-    pub fn settle_image(&mut self, worth: f64) -> bool {
-        let kept = self.storage.keep(worth);
-        self.state.stored_bits = self.storage.stored();
-        self.state.to_send_bits = self.storage.to_send();
-        kept
-    }
-
-    /// Files whose last bit came to the ground since this was last asked.
-    pub fn take_delivered(&mut self) -> Vec<ImageFile> {
-        std::mem::take(&mut self.delivered)
     }
 
     /// How power and data stand.
@@ -361,7 +399,9 @@ impl ResourceState {
             contact: None,
             sent_bits: 0,
             rod_dipole_B: Vector3::zeros(),
-            failure: None,
+            momentum_nms: 0.0,
+            safe_mode: None,
+            delivered: Delivered::NONE,
         }
     }
 }

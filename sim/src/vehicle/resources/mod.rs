@@ -5,4 +5,4 @@ pub mod battery;
 pub mod momentum;
 pub mod storage;
 
-pub use account::{Activity, Failure, Imager, Onboard, ResourceState};
+pub use account::{Activity, Delivered, Failure, Imager, Onboard, ResourceState};
