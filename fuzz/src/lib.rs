@@ -117,8 +117,8 @@ mod tests {
     #[test]
     fn what_was_found_once_stays_mended() {
         let found = Path::new(env!("CARGO_MANIFEST_DIR")).join("found");
-        let targets: [(&str, fn(&[u8])); 4] =
-            [("cdr", cdr), ("missions", missions), ("faults", faults), ("words", words)];
+        type Target = fn(&[u8]);
+        let targets: [(&str, Target); 4] = [("cdr", cdr), ("missions", missions), ("faults", faults), ("words", words)];
         for (name, target) in targets {
             for file in std::fs::read_dir(found.join(name)).into_iter().flatten() {
                 target(&std::fs::read(file.unwrap().path()).unwrap());

@@ -14,7 +14,8 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use serde_json::{Map, Value, json};
 
-use crate::{process, soak};
+use crate::process;
+use crate::soak::number;
 
 /// What is fuzzed, and where there are inputs to begin with.
 const TARGETS: [(&str, &str); 4] = [
@@ -32,7 +33,7 @@ const TIMEOUT_S: u32 = 10;
 pub fn run(root: &Path, args: &[OsString]) -> Result<()> {
     let inputs = match args {
         [] => INPUTS,
-        [inputs] => soak::number(inputs)?,
+        [inputs] => number(inputs)?,
         _ => bail!("soak fuzz takes a number of inputs"),
     };
     let mut build = process::cargo(root, "build");

@@ -113,11 +113,9 @@ fn watch(node: Name, witness: &Witness, out: &Path, killed: bool) -> Result<Vec<
     let (_, ended) = sortie::until("end of its own", LIMIT, || withheld::has_ended(pid).then_some(()))?;
     // The one in its place is another one, and works.
     let now = witness::process(node.1, out).filter(|other| *other != pid).context("nobody is in its place")?;
-    let before = witness.work(node)?;
-    if node.0 != "recorder" {
-        witness.wait_for_more(node, before)?;
-    }
-    std::thread::sleep(Duration::from_secs(2));
+    let tasks = || std::fs::read_to_string(out.join("tasks.jsonl")).map_or(0, |text| text.lines().count());
+    let before = tasks();
+    sortie::until("more tasks", LIMIT, || (tasks() > before + 2).then_some(()))?;
     ensure!(witness::process(node.1, out) == Some(now), "the one in its place was replaced, too");
     Ok([told, vec![("ended_by_itself_s", ended)]].concat())
 }
