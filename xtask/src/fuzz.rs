@@ -4,7 +4,6 @@
 //! it reaches. Inputs that reach something new stand in `target/soak/fuzz/NAME`, so that one that was stopped goes on
 //! with what it has found.
 
-use std::ffi::OsString;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
@@ -15,7 +14,6 @@ use anyhow::{Context, Result, bail};
 use serde_json::{Map, Value, json};
 
 use crate::process;
-use crate::soak::number;
 
 /// What is fuzzed, and where there are inputs to begin with.
 const TARGETS: [(&str, &str); 4] = [
@@ -30,12 +28,8 @@ const INPUTS: u64 = 10_000_000;
 const TIMEOUT_S: u32 = 10;
 
 /// Fuzzes each target with so many inputs and prints what was reached.
-pub fn run(root: &Path, args: &[OsString]) -> Result<()> {
-    let inputs = match args {
-        [] => INPUTS,
-        [inputs] => number(inputs)?,
-        _ => bail!("soak fuzz takes a number of inputs"),
-    };
+pub fn run(root: &Path, inputs: Option<u64>) -> Result<()> {
+    let inputs = inputs.unwrap_or(INPUTS);
     let mut build = process::cargo(root, "build");
     build.args(["--quiet", "--release", "--package", "swath-fuzz", "--features", "fuzzing", "--bins"]);
     process::run(build.env("RUSTC_WORKSPACE_WRAPPER", root.join("fuzz/instrument")))?;

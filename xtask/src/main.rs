@@ -200,6 +200,11 @@ fn soak(root: &Path, args: &[OsString]) -> Result<()> {
         && name == "fuzz"
     {
         prerequisites::check()?;
+        let inputs = match inputs {
+            [] => None,
+            [inputs] => Some(soak::number(inputs)?),
+            _ => bail!("soak fuzz takes a number of inputs\n\n{USAGE}"),
+        };
         return fuzz::run(root, inputs);
     }
     setup(root, true)?;
