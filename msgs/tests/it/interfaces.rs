@@ -103,11 +103,13 @@ fn schema_is_the_text_then_each_dependency_once() {
     let file = |path: &str| std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).unwrap();
     let rule = "=".repeat(80);
     let expected = format!(
-        "{}{rule}\nMSG: builtin_interfaces/Time\n{}{rule}\nMSG: geometry_msgs/Vector3\n{}{rule}\nMSG: std_msgs/Header\n{}",
+        "{}{rule}\nMSG: builtin_interfaces/Time\n{}{rule}\nMSG: geometry_msgs/Vector3\n{}{rule}\nMSG: std_msgs/Header\n{}{rule}\n\
+         MSG: swath_msgs/ResourceState\n{}",
         file("msg/SpacecraftState.msg"),
         file("standard/builtin_interfaces/msg/Time.msg"),
         file("standard/geometry_msgs/msg/Vector3.msg"),
         file("standard/std_msgs/msg/Header.msg"),
+        file("msg/ResourceState.msg"),
     );
     assert_eq!(SpacecraftState::SCHEMA, expected);
 }
@@ -172,8 +174,8 @@ fn bounded_sequence_and_flags_have_the_bytes_that_cdr_prescribes() {
     let mut point = DecisionPoint { mission_over: true, ..DecisionPoint::default() };
     point.result.push(TaskResult { task: 3, success: true, ..TaskResult::default() });
     let bytes = cdr(&point);
-    // Header 16 (empty frame: 4 + 1 zero, padded), tick, task, then the state.
-    let before_flag = 16 + 8 + 8 + (16 + 8 + 18 * 8) + 9 * 8;
+    // Header 16 (empty frame: 4 + 1 zero, padded), tick, task, then the state, whose resources are none (4 zero, padded).
+    let before_flag = 16 + 8 + 8 + (16 + 8 + 18 * 8 + 8) + 9 * 8;
     assert_eq!(bytes[before_flag..before_flag + 8], [1, 0, 0, 0, 1, 0, 0, 0]);
     assert_eq!(bytes[before_flag + 8..before_flag + 16], 3_u64.to_le_bytes());
     round_trip(&point);
