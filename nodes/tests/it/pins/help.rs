@@ -4,7 +4,7 @@ use crate::pins::golden;
 use crate::pins::place::Place;
 
 /// Every program of the suite.
-pub const PROGRAMS: [&str; 9] = [
+pub const PROGRAMS: [&str; 10] = [
     "swath",
     "swath-bag",
     "swath-train",
@@ -12,6 +12,7 @@ pub const PROGRAMS: [&str; 9] = [
     "swath-guidance",
     "swath-planner",
     "swath-requests",
+    "swath-requests-learned",
     "swath-catalogue",
     "swath-link",
 ];
