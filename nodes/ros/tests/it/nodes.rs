@@ -240,8 +240,17 @@ fn parameters_are_read_and_set_from_outside() {
     let list = tool.client::<ListParameters>(&graph::Service::new("spacecraft/list_parameters", &[], &[])).unwrap();
     tool.wait_for_service(&list, PATIENCE).unwrap();
     let names = list.call(ListParametersRequest::default(), PATIENCE).unwrap().result.names;
-    let own =
-        ["epoch", "external", "fleet", "memory_limit_mb", "orphaned_s", "pace", "packet_filter", "signs", "use_sim_time"];
+    let own = [
+        "epoch",
+        "external",
+        "fleet",
+        "memory_limit_mb",
+        "orphaned_s",
+        "pace",
+        "packet_filter",
+        "signs",
+        "use_sim_time",
+    ];
     assert_eq!(names, own);
 
     let set = tool.client::<SetParameters>(&graph::Service::new("spacecraft/set_parameters", &[], &[])).unwrap();
