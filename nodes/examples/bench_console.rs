@@ -2,20 +2,19 @@
 //! JSON object of numbers, an empty one where the tests' Python is missing.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/server.rs"]
-mod server;
+mod common;
 
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
-use flight::{Flight, python};
 use serde_json::{Map, Value, json};
-use server::Server;
+
+use crate::common::flight::{Flight, python};
+use crate::common::server::Server;
 
 const DOMAIN: u16 = 146;
 const MISSION: &str = "planner = \"heuristic:90\"\n[requests.random]\ncount = [5000, 5000]\n";

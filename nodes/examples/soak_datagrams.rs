@@ -5,11 +5,9 @@
 //! 5000 datagrams, each to all of them. It must end by itself, with the tasks of the same mission in one process.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 #[path = "../tests/it/storm.rs"]
 mod storm;
 #[path = "../ros/tests/it/stranger.rs"]
@@ -20,9 +18,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use flight::Flight;
 use serde_json::{Value, json};
 use storm::Storm;
+
+use crate::common::flight::Flight;
+use crate::common::soak;
 
 const DOMAIN: u16 = 148;
 const MISSION: &str = "planner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";

@@ -6,23 +6,21 @@
 //! types. The tasks must be those of the same mission in one process; speeds are told as shares of that alone.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/company.rs"]
-mod company;
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
-use company::{Kind, Pairing};
 use serde_json::Value;
 use swath_msgs::RosMessage;
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Cdr, Environment, Node, RawPublisher, RosArgs, encode, graph};
+
+use crate::common::company::{Kind, Pairing};
+use crate::common::{company, soak};
 
 const DOMAIN: u16 = 152;
 const MISSION: &str = "planner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";

@@ -7,22 +7,20 @@
 //! of the same mission in one process.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/company.rs"]
-mod company;
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use company::{Kind, Pairing};
-use flight::{python, signal};
 use serde_json::Value;
+
+use crate::common::company::{Kind, Pairing};
+use crate::common::flight::{python, signal};
+use crate::common::{company, soak};
 
 const DOMAIN: u16 = 149;
 const MISSION: &str = "planner = \"lookahead\"\n[requests.random]\ncount = [3000, 3000]\n";

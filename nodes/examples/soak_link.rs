@@ -6,21 +6,21 @@
 //! all requests must be the same, byte by byte.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Result;
-use flight::{Flight, signal};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
+
+use crate::common::flight::{Flight, signal};
+use crate::common::soak;
 
 const DOMAIN: u16 = 151;
 /// Stations and orbits: as many kills fit into each.

@@ -5,15 +5,15 @@
 //! may be raised.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 
 use anyhow::{Result, ensure};
-use flight::Flight;
 use serde_json::json;
+
+use crate::common::flight::Flight;
+use crate::common::soak;
 
 const DOMAIN: u16 = 154;
 /// More than a day.

@@ -2,11 +2,9 @@
 //! `soak_schemathesis FIRST COUNT` for some seeds; prints one JSON object, and fails where anything contradicts.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
@@ -14,8 +12,10 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
-use flight::{Flight, python};
 use serde_json::{Value, json};
+
+use crate::common::flight::{Flight, python};
+use crate::common::soak;
 
 const DOMAIN: u16 = 148;
 const MISSION: &str = "planner = \"lookahead\"\norbits = 400.0\npace = 40.0\n[requests.random]\ncount = [80, 80]\n";

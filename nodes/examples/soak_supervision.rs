@@ -6,20 +6,20 @@
 //! shares of that without, the middle of three pairs.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "common/flight.rs"]
+#[path = "common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "common/soak.rs"]
-mod soak;
+mod common;
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use flight::{Flight, signal, swath};
 use serde_json::json;
 use swath_ros::{Environment, Node, RosArgs, Subscription, graph};
+
+use crate::common::flight::{Flight, signal, swath};
+use crate::common::soak;
 
 const DOMAIN: u16 = 153;
 const PROGRAMS: [&str; 4] = ["swath-spacecraft", "swath-guidance", "swath-planner", "swath-requests"];

@@ -4,14 +4,10 @@
 //! Prints one JSON object. Exit code 1 when something did not hold; each failure tells one command that repeats it.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program for people")]
 
-#[path = "../common/flight.rs"]
+#[path = "../common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-mod look;
+mod common;
 mod mission;
-mod operator;
-#[path = "../common/request.rs"]
-mod request;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -21,8 +17,9 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::json;
 use swath_mission::file::Mission;
 
-use crate::flight::Flight;
-use crate::operator::Acknowledged;
+use crate::common::flight::Flight;
+use crate::common::operator::Acknowledged;
+use crate::common::{look, operator};
 
 /// How long a mission may take in all, restarts and hung nodes included.
 const LIMIT: Duration = Duration::from_secs(300);

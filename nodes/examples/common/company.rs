@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use serde_json::{Value, json};
 
-use crate::flight::Flight;
+use super::flight::Flight;
 
 /// Name, orbits and pace of a kind of mission.
 pub type Kind = (&'static str, &'static str, &'static str);

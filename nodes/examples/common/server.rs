@@ -5,7 +5,7 @@ use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::flight::swath;
+use super::flight::swath;
 
 /// Linux tells times of processes in hundredths of a second, whatever the kernel counts in (`man 5 proc`).
 const USER_HZ: f64 = 100.0;

@@ -10,9 +10,9 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use swath_ros::Environment;
 
-use crate::flight::{Flight, swath};
-use crate::look;
-use crate::operator::Operator;
+use super::flight::{Flight, swath};
+use super::look;
+use super::operator::Operator;
 
 /// How long a mission may go on after all that befalls it.
 const LIMIT: Duration = Duration::from_secs(300);

@@ -3,23 +3,9 @@
 //! mission in which that happens to each of its five nodes, in every fifth one by stopping.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program for people")]
 
-#[path = "../common/flight.rs"]
+#[path = "../common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "../chaos_over_dds/look.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod look;
-#[path = "../chaos_over_dds/operator.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod operator;
-#[path = "../common/request.rs"]
-mod request;
-#[path = "../common/soak.rs"]
-mod soak;
-#[path = "../common/sortie.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod sortie;
-mod witness;
+mod common;
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -30,8 +16,9 @@ use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::{Value, json};
 
-use crate::flight::{Flight, signal};
-use crate::witness::{NODES, Witness};
+use crate::common::flight::{Flight, signal};
+use crate::common::witness::{NODES, Witness};
+use crate::common::{soak, sortie, witness};
 
 /// Missions of a whole figure.
 const SEEDS: u64 = 50;

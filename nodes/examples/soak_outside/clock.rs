@@ -8,8 +8,9 @@ use std::time::Duration;
 use anyhow::{Result, ensure};
 use serde_json::{Value, json};
 
-use crate::flight::{Flight, swath};
-use crate::{Mission, needs, sortie};
+use crate::common::flight::{Flight, swath};
+use crate::common::sortie;
+use crate::{Mission, needs};
 
 /// What moves the clock of the processes that load it.
 const LIBRARY: &str = "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1";
@@ -75,6 +76,6 @@ fn flies_on(out: &Path) -> Result<()> {
 
 /// How many alarms were raised.
 fn alarms(out: &Path) -> Result<usize> {
-    let journal = crate::look::lines(&out.join("alarms.jsonl"))?;
+    let journal = crate::common::look::lines(&out.join("alarms.jsonl"))?;
     Ok(journal.iter().filter(|line| line["event"] == "raised").count())
 }

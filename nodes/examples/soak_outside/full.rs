@@ -10,8 +10,9 @@ use serde_json::{Value, json};
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Client, Node, RosArgs, graph};
 
-use crate::flight::Flight;
-use crate::{Mission, command, sortie};
+use crate::common::flight::Flight;
+use crate::common::sortie;
+use crate::{Mission, command};
 
 /// How long the disk is full.
 const FULL: Duration = Duration::from_secs(15);

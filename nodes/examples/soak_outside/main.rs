@@ -8,30 +8,19 @@
 #![allow(missing_docs, clippy::print_stdout, reason = "a program for people")]
 
 mod clock;
-#[path = "../common/flight.rs"]
+#[path = "../common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
+mod common;
 mod full;
-#[path = "../chaos_over_dds/look.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod look;
 mod network;
-#[path = "../chaos_over_dds/operator.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod operator;
-#[path = "../common/request.rs"]
-mod request;
-#[path = "../common/soak.rs"]
-mod soak;
-#[path = "../common/sortie.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod sortie;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Value, json};
+
+use crate::common::soak;
 
 /// Each of them in three missions.
 const SEEDS: u64 = 15;

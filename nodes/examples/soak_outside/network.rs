@@ -9,9 +9,10 @@ use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use swath_ros::Environment;
 
-use crate::flight::{Flight, swath};
-use crate::operator::Operator;
-use crate::{Mission, command, look, rewards, sortie};
+use crate::common::flight::{Flight, swath};
+use crate::common::operator::Operator;
+use crate::common::{look, sortie};
+use crate::{Mission, command, rewards};
 
 /// Simulated seconds a second.
 const PACE: f64 = 20.0;

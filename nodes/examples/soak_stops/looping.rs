@@ -9,8 +9,8 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 
-use crate::flight::{Flight, signal, swath};
-use crate::{sortie, witness};
+use crate::common::flight::{Flight, signal, swath};
+use crate::common::{sortie, witness};
 
 /// The programs of a mission.
 const PROGRAMS: [&str; 6] =

@@ -6,26 +6,11 @@
 //! What must hold of every mission holds: what was acknowledged is kept, once, tasks follow each other, the bag is valid.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program for people")]
 
-#[path = "../common/flight.rs"]
+#[path = "../common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "../chaos_over_dds/look.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod look;
+mod common;
 mod looping;
-#[path = "../chaos_over_dds/operator.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod operator;
-#[path = "../common/request.rs"]
-mod request;
-#[path = "../common/soak.rs"]
-mod soak;
-#[path = "../common/sortie.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod sortie;
 mod withheld;
-#[path = "../soak_kills/witness.rs"]
-mod witness;
 
 use std::path::Path;
 use std::process::Command;
@@ -34,8 +19,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 
-use crate::flight::{Flight, signal, swath};
-use crate::witness::{NODES, Name, Witness};
+use crate::common::flight::{Flight, signal, swath};
+use crate::common::witness::{NODES, Name, Witness};
+use crate::common::{soak, sortie, witness};
 
 /// Five nodes that are killed, five that cannot be, and two that fail again and again.
 const SEEDS: u64 = 12;

@@ -7,23 +7,18 @@
 //! so that what is told is what serving them costs. The tasks must be those of the same mission in one process.
 #![allow(clippy::print_stdout, missing_docs, reason = "a measuring tool")]
 
-#[path = "../common/company.rs"]
-mod company;
-#[path = "../common/flight.rs"]
+#[path = "../common/mod.rs"]
 #[allow(dead_code, reason = "others use more of it")]
-mod flight;
-#[path = "../common/server.rs"]
-#[allow(dead_code, reason = "others use more of it")]
-mod server;
-#[path = "../common/soak.rs"]
-mod soak;
+mod common;
 mod watchers;
 
 use anyhow::{Result, ensure};
-use company::{Kind, Pairing};
 use serde_json::Value;
-use server::Server;
 use watchers::Watchers;
+
+use crate::common::company::{Kind, Pairing};
+use crate::common::server::Server;
+use crate::common::{company, soak};
 
 const DOMAIN: u16 = 147;
 const MISSION: &str = "planner = \"heuristic:90\"\n[requests.random]\ncount = [3000, 3000]\n";

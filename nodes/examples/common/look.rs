@@ -15,8 +15,8 @@ use swath_msgs::rosgraph_msgs::Clock;
 use swath_ros::{Cdr, decode};
 use swath_sim::vehicle::faults::FOR_GOOD;
 
-use crate::flight::swath;
-use crate::operator::SUBMITTER;
+use super::flight::swath;
+use super::operator::SUBMITTER;
 
 /// Checks what must hold of every mission that has ended: `requests` were acknowledged.
 pub fn check(out: &Path, requests: &BTreeMap<String, u64>) -> Result<()> {

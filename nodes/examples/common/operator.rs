@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use swath_msgs::swath_msgs as msg;
 use swath_ros::{Client, Environment, Node, RosArgs, graph};
 
-use crate::request::request;
+use super::request::request;
 
 /// How long an answer may take before the call is made again.
 const PATIENCE: Duration = Duration::from_millis(500);
