@@ -44,8 +44,7 @@ impl Flying {
 
     /// The same again, to be flown on by itself.
     pub(super) fn fork(&self) -> Self {
-        let planner = self.planner.as_ref().and_then(|planner| planner.fork());
-        Self { mission: self.mission.clone(), planner }
+        self.resumed(self.mission.clone())
     }
 
     /// The same with a planner that has come so far, where this one goes on from what is known.
