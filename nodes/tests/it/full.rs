@@ -110,6 +110,23 @@ fn a_fifth_of_the_messages_costs_little() {
 }
 
 #[test]
+fn an_output_that_cannot_be_written_costs_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let text_of = "orbits = 0.4\npace = 100.0\nplanner = \"heuristic:90\"\n[requests.random]\ncount = [1500, 1500]\n\
+                   [faults]\nplan = [\"wheel2:weak 60%@1000s\"]\n";
+    let mission = common::write_mission(folder.path(), text_of);
+    let out = folder.path().join("out");
+    let mut flight = common::Running::start(launch(&common::domain(), &mission, &out).arg("--no-bag"));
+    common::until("the folder", || out.join("tasks.jsonl").exists().then_some(()));
+    // Where the alarms' journal goes there is something else.
+    std::fs::create_dir_all(out.join("alarms.jsonl/in_the_way")).unwrap();
+    assert_eq!(flight.wait().code(), Some(1));
+    assert!(text(&out, "tasks.jsonl").lines().count() > 2, "what was flown is there");
+    let summary: Value = serde_json::from_str(&text(&out, "summary.json")).unwrap();
+    assert!(summary["failure"].as_str().unwrap().contains("alarms.jsonl"), "{summary}");
+}
+
+#[test]
 fn a_mission_ends_although_its_last_messages_are_lost() {
     let folder = tempfile::tempdir().unwrap();
     for seed in 0..4 {

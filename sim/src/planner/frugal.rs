@@ -1,6 +1,7 @@
 //! A beam search that pays for energy and data, and charges and sends where that costs least.
 
 use super::decision::{Decision, DecisionContext, Planner, PlannerError, wait_for_a_window};
+use super::handmade::WHEELS_W;
 use super::lookahead::{BeamSearch, Experience, Meter, Prices, Search};
 use crate::config::resources::ResourcesConfig;
 use crate::task::Duty;
@@ -41,8 +42,7 @@ impl Default for Tariff {
     }
 }
 
-/// Load of wheels that image all the time [W], and shares of that time in which the imager and the transmitter work.
-const WHEELS_W: f64 = 60.0;
+/// Shares of the time of a satellite that images all the time in which the imager and the transmitter work.
 const IMAGER_SHARE: f64 = 0.75;
 const TRANSMITTER_SHARE: f64 = 0.15;
 /// Steps in which the light until the next shadow is added up.

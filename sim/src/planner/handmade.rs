@@ -19,7 +19,7 @@ const MOMENTUM_SHARE: f64 = 0.7;
 /// Length of what it does itself [s].
 const DUTY_S: f64 = 60.0;
 /// Load of wheels that image all the time [W].
-const WHEELS_W: f64 = 60.0;
+pub(super) const WHEELS_W: f64 = 60.0;
 
 impl Handmade {
     /// The shield around a planner, with its least requirement.

@@ -249,8 +249,8 @@ fn fly_in_process(mission: &Mission, output: &mut OutputFolder, policies: &Polic
     progress.finish();
     let failure = outcome.err().map(Error::from);
     let failure = failure.or(unwritten.map(|error| error.context("cannot write tasks.jsonl")));
-    output.finish(&flight.board().take_journal())?;
-    output.write_ways(&flight.ways())?;
+    let kept = output.finish(&flight.board().take_journal());
+    let failure = failure.or(kept.err()).or(output.write_ways(&flight.ways()).err());
     let (requested, accepted) = flight.counts();
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),

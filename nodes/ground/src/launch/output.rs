@@ -66,8 +66,11 @@ impl OutputFolder {
         Ok((Self { path: path.to_owned(), made: false, tasks: Appended::new(file) }, lines))
     }
 
-    /// Removes all that is in the folder, so that it can be asked for again: nothing was flown.
+    /// Removes all that is in the folder, so that it can be asked for again, unless something was flown.
     pub fn discard(self) -> Result<()> {
+        if fs::metadata(self.path.join("tasks.jsonl")).is_ok_and(|tasks| tasks.len() > 0) {
+            return Ok(());
+        }
         let failed = || format!("cannot clear output folder {}", self.path.display());
         for entry in fs::read_dir(&self.path).with_context(failed)? {
             let entry = entry.with_context(failed)?;

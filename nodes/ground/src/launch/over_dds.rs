@@ -114,7 +114,7 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
     let Some(flown) = launcher.flown else {
         return Err(watched.err().unwrap_or_else(|| anyhow!("the mission has not begun")));
     };
-    output.finish(&launcher.alarms.journal(flown.end))?;
+    let kept = output.finish(&launcher.alarms.journal(flown.end));
     // The recorder ends first: the nodes' last messages reach it while they are still there.
     let recorded = fleet.stop(&[graph::RECORDER]).and_then(|()| match record {
         true => count_messages(&output.path().join("bag")),
@@ -126,12 +126,12 @@ fn land(mission: &Mission, mut launcher: Launcher, mut fleet: Fleet, output: &mu
         Ok(count) => (count, None),
         Err(error) => (0, Some(error)),
     };
-    // The first of them is the cause of the others.
-    let failure = watched.err().or(unrecorded).or(ended.err());
     let safe_mode = launcher.safe_mode.take();
     let model = mission.model()?;
     let ground = ground(mission, &model, output)?;
-    output.write_ways(&ground.iter().flat_map(Ground::lines).collect::<Vec<_>>())?;
+    let told = output.write_ways(&ground.iter().flat_map(Ground::lines).collect::<Vec<_>>());
+    // The first of them is the cause of the others.
+    let failure = watched.err().or(unrecorded).or(ended.err()).or(kept.err()).or(told.err());
     let inputs = SummaryInputs {
         planner: mission.planner.to_string(),
         decided_instead: made_instead(launcher.deciders.clone(), &mission.planner),
