@@ -90,6 +90,9 @@ impl<N: LifecycleNode, C: Fn(MissionNode) -> Result<N>> Life<N, C> {
     fn live(&mut self, autostart: bool) -> Result<()> {
         let (lifecycle, shutdown) = (Rc::clone(&self.lifecycle), self.shutdown.clone());
         for label in ["configure", "activate"].into_iter().filter(|_| autostart) {
+            if let Held::Node(node) = &self.held {
+                node.base().wait_for_recorder()?;
+            }
             if !lifecycle.take(label, |transition| self.act(transition))? {
                 return self.fault.take().map_or(Ok(()), Err);
             }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use swath_ros::{Dropping, Managed, Node, Publisher, RosArgs, Shutdown, Spec, graph};
+use swath_ros::{Dropping, Managed, Node, Publisher, RosArgs, RosError, Shutdown, Spec, graph};
 use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
@@ -20,7 +20,7 @@ use crate::error::MessageError;
 use crate::health::{HEALTH, Health, Known};
 use crate::orders_heard::FaultOrders;
 use crate::out;
-use crate::program::{AUTOSTART, MISSION, Program};
+use crate::program::{AUTOSTART, MISSION, Program, RECORDED};
 use crate::stamp::Stamper;
 use swath_mission::alarms;
 use swath_mission::alarms::conditions::Report;
@@ -60,6 +60,8 @@ pub struct MissionNode {
     /// What is ordered to befall this node, the next first, and how often something has already.
     ordered: VecDeque<(Scheduled, Failure)>,
     struck: u64,
+    /// Whether the mission is recorded.
+    recorded: bool,
     /// As which it can be made to fail.
     process: Option<Process>,
     pub(crate) fault_orders: FaultOrders,
@@ -67,6 +69,12 @@ pub struct MissionNode {
 
 /// So much of what was told of alarms is told again to a launcher that takes over.
 const TOLD: usize = 1000;
+
+/// How long the last messages before a fault by order may take to arrive.
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// How long a node that was started again waits for the recorder: that may have been lost too.
+const RECORDER_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// How grave an alarm is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,6 +114,7 @@ impl MissionNode {
         let keep = PathBuf::from(node.parameters().declare(keep.read_only())?);
         let struck = Spec::new("struck", 0_i64, "Faults ordered for this node that have befallen it already.");
         let struck = node.parameters().declare(struck.in_range(0.0..=1e6).read_only())?.unsigned_abs();
+        let recorded = node.parameters().declare(Spec::new(RECORDED.name, false, RECORDED.about).read_only())?;
         let diagnostics = node.publisher(&graph::DIAGNOSTICS)?;
         let fault_orders = FaultOrders::new(&node, name, mission.tells_truth_apart(model.period))?;
         let health = Mutex::new(Health::new(Instant::now(), tick_of(&mission, &model)));
@@ -126,6 +135,7 @@ impl MissionNode {
             keep: (!keep.as_os_str().is_empty()).then_some(keep),
             ordered: VecDeque::new(),
             struck,
+            recorded,
             process: Process::ALL.into_iter().find(|process| process.name() == name),
             fault_orders,
             node,
@@ -147,6 +157,25 @@ impl MissionNode {
         };
         let drops = self.mission.faults.drops(self.model.period);
         self.node.set_drops(self.mission.seed, drops.into_iter().map(dropping).collect());
+    }
+
+    /// A node that was started again says nothing before the recorder hears it, for as long as that may take.
+    ///
+    /// # Errors
+    /// When the node may not go on.
+    pub(crate) fn wait_for_recorder(&self) -> Result<()> {
+        // A sign of life: from now on it is missed when there is none.
+        self.node.check()?;
+        if self.node.epoch() == 0 || !self.recorded {
+            return Ok(());
+        }
+        match self.node.wait_for_peers(&[graph::RECORDER], RECORDER_TIMEOUT) {
+            Err(RosError::MissingPeers { .. }) => {
+                tracing::warn!("goes on although the recorder does not hear it");
+                Ok(())
+            }
+            outcome => Ok(outcome?),
+        }
     }
 
     /// A file in which this node keeps what it needs to go on when it is started again; nothing where nobody would.
@@ -189,8 +218,9 @@ impl MissionNode {
         self.ordered.front().map(|(it, _)| it.from)
     }
 
-    /// The fault that was ordered for this node befalls it now; what it has sent must have arrived.
+    /// The fault that was ordered for this node befalls it now, once what it has sent has arrived.
     pub fn strike(&self) -> ! {
+        let _ = self.node.flush(FLUSH_TIMEOUT);
         self.node.tell_struck(self.struck);
         match self.ordered.front() {
             Some((_, Failure::Hang)) => loop {

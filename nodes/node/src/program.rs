@@ -38,6 +38,12 @@ pub const AUTOSTART: Parameter = Parameter {
     about: "Whether the node is configured and activated by itself; if not, by its life cycle's services.",
 };
 
+/// Whether somebody writes down what a node says.
+pub const RECORDED: Parameter = Parameter {
+    name: "recorded",
+    about: "Whether the mission is recorded: a node that is started again waits for the recorder.",
+};
+
 /// What every node of a mission takes; [`MISSION`] must be given.
 const COMMON: &[Parameter] = &[
     MISSION,
@@ -50,6 +56,7 @@ const COMMON: &[Parameter] = &[
     Parameter { name: "struck", about: "Faults ordered for this node that have befallen it already." },
     Parameter { name: "memory_limit_mb", about: "Memory that the process may have [10^6 B]; 0 without bound." },
     AUTOSTART,
+    RECORDED,
     Parameter {
         name: "packet_filter",
         about: "Whether the kernel drops datagrams that would end or fill the process.",

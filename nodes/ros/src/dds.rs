@@ -4,6 +4,7 @@
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
+use std::time::{Duration, Instant};
 
 use ros2_client::Gid;
 use rustdds::DomainParticipant;
@@ -84,6 +85,13 @@ impl Dds {
         let mut slots = lock(&self.slots);
         slots.retain(|slot| slot.strong_count() > 0);
         slots.push(slot);
+    }
+
+    /// Waits until every reliable reader has all samples of all writers, and tells whether that is so.
+    pub(crate) fn flush(&self, timeout: Duration) -> bool {
+        let deadline = Instant::now() + timeout;
+        let slots: Vec<Arc<dyn Slot>> = lock(&self.slots).iter().filter_map(Weak::upgrade).collect();
+        slots.iter().all(|slot| slot.flush(deadline.saturating_duration_since(Instant::now())))
     }
 
     /// Replaces the participant and all endpoints.

@@ -248,6 +248,12 @@ impl Node {
         Ok(Subscription::new(raw, topic.entry.writers, drops))
     }
 
+    /// Waits until every reliable reader has all that this node has sent, and tells whether that is so.
+    #[must_use]
+    pub fn flush(&self, timeout: Duration) -> bool {
+        self.dds.flush(timeout)
+    }
+
     /// Drops a share of the messages that come again when they are not answered, drawn from a seed: a fault by order.
     pub fn set_drops(&self, seed: u64, drops: Vec<Dropping>) {
         self.drops.set(seed, drops);

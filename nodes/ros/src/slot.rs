@@ -38,6 +38,9 @@ pub(crate) trait Slot: Send + Sync {
 
     /// The new endpoint is known to all: it goes on where the old one was.
     fn resume(&self);
+
+    /// Waits until every reliable reader has all samples, and tells whether that is so.
+    fn flush(&self, timeout: Duration) -> bool;
 }
 
 /// A writer.
@@ -111,6 +114,10 @@ impl Slot for WriterSlot {
             tracing::warn!("what was latched on {} is lost: {error}", self.plan.topic);
         }
     }
+
+    fn flush(&self, timeout: Duration) -> bool {
+        Self::flush(self, timeout)
+    }
 }
 
 /// A reader.
@@ -175,6 +182,11 @@ impl Slot for ReaderSlot {
         if let Some(bell) = lock(&self.bell).as_ref() {
             bell.wake_by_ref();
         }
+    }
+
+    /// A reader has nothing to say.
+    fn flush(&self, _: Duration) -> bool {
+        true
     }
 }
 

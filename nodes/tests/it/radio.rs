@@ -86,7 +86,7 @@ fn whoever_of_the_radio_is_killed_nothing_is_lost_doubled_or_even_different() {
     let folder = tempfile::tempdir().unwrap();
     let link = format!("[link]\nstations = [{SEVEN}]\nstrip_bits = 50e6\nloss = 0.1\nuplink_bps = 4000\n");
     let mission = mission(folder.path(), "killed", &link);
-    let words = ["--planner", "lookahead", "--orbits", "12.0", "--seed", "4", "--no-bag"];
+    let words = ["--planner", "lookahead", "--orbits", "12.0", "--seed", "4"];
     let (alone, killed) = (folder.path().join("alone"), folder.path().join("killed"));
     common::succeed(&mut launch(&mission, &alone, &[&words[..], &["--in-process"]].concat()));
     let mut flight = common::Running::start(&mut launch(&mission, &killed, &words));
@@ -104,6 +104,8 @@ fn whoever_of_the_radio_is_killed_nothing_is_lost_doubled_or_even_different() {
         let name = format!("{node} lost");
         assert!(lines(&killed, "alarms.jsonl").iter().any(|it| it["name"] == name.as_str()), "{name}");
     }
+    // Whoever was started again was recorded from its first word on.
+    common::succeed(common::swath("0", &["refly"]).arg(killed.join("bag")));
 }
 
 #[test]

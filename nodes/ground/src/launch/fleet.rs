@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use rustix::process::Signal;
 use swath_bags::cli::NO_ROOM;
 use swath_ros::{Sign, graph};
@@ -263,24 +263,18 @@ impl Fleet {
         self.members.iter().filter_map(of).collect()
     }
 
-    /// Asks the members of these names to end, in this order, and waits until each has.
+    /// Asks the members of these names to end, in this order, and waits until each has. The first failure is told.
+    ///
+    /// A node that is killed on the way costs nothing: the mission is over, and what it keeps is kept. The recorder is
+    /// no such node, it has a bag to close.
     pub fn stop(&mut self, names: &[&str]) -> Result<()> {
+        let mut outcome = Ok(());
         for name in names {
             let Some(at) = self.members.iter().position(|member| member.name == *name) else { continue };
-            let member = self.members.swap_remove(at);
-            let Some(mut running) = member.running else {
-                if member.no_room {
-                    continue;
-                }
-                bail!("node {name} was lost and is not there again")
-            };
-            let ending = running.stop()?;
-            let no_room = *name == graph::RECORDER && ending.code() == Some(i32::from(NO_ROOM));
-            if !ending.is_well() && !no_room {
-                bail!("{}", ending.of(name));
-            }
+            let stopped = self.members.swap_remove(at).stop();
+            outcome = outcome.and(stopped);
         }
-        Ok(())
+        outcome
     }
 }
 
@@ -303,6 +297,30 @@ impl Member {
         let failed = || format!("cannot start node {}: {}", self.name, program.display());
         self.running = Some(Running::start(&mut command).with_context(failed)?);
         Ok(())
+    }
+
+    fn stop(self) -> Result<()> {
+        let (name, records) = (&self.name, self.name == graph::RECORDER);
+        let Some(mut running) = self.running else {
+            return match (records, self.no_room) {
+                (_, true) => Ok(()),
+                (true, _) => Err(anyhow!("node {name} was lost and is not there again")),
+                (false, _) => {
+                    tracing::warn!("node {name} was lost and is not there again: the mission is over");
+                    Ok(())
+                }
+            };
+        };
+        let ending = running.stop()?;
+        let no_room = records && ending.code() == Some(i32::from(NO_ROOM));
+        if ending.is_well() || no_room {
+            return Ok(());
+        }
+        if ending.is_killed() && !records {
+            tracing::warn!("{}: the mission is over", ending.of(name));
+            return Ok(());
+        }
+        Err(anyhow!("{}", ending.of(name)))
     }
 
     fn kept(&self) -> KeptMember {

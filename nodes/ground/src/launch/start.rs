@@ -94,7 +94,8 @@ pub(super) fn start_nodes(
     let words = |extra: &[String]| {
         let own = ["--ros-args", "-p", &mission, "-p", &keep].map(str::to_owned);
         let own = own.into_iter().chain(in_namespace(namespace)).chain(wishes.external());
-        own.chain(extra.iter().cloned()).collect::<Vec<_>>()
+        let recorded = wishes.record.then(|| ["-p", "recorded:=true"].map(str::to_owned)).into_iter().flatten();
+        own.chain(recorded).chain(extra.iter().cloned()).collect::<Vec<_>>()
     };
     let store = format!("store:={}", text(&output.path().join(STORE))?);
     // libtorch is large: only who needs it has it.

@@ -1,7 +1,5 @@
 //! The request manager's topics where ground and satellite are one: it answers guidance and the planner itself.
 
-use std::time::Duration;
-
 use anyhow::{Result, bail};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
@@ -17,9 +15,6 @@ use swath_sim::world::strip::StripId;
 use super::messages;
 use super::outgoing::Outgoing;
 use super::store::Store;
-
-/// How long the last messages before a fault by order may take to arrive.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The topics of guidance and planner.
 pub(super) struct FlightSide {
@@ -69,7 +64,6 @@ impl FlightSide {
         outgoing: &mut Vec<Outgoing>,
     ) -> Result<()> {
         if base.strikes_at().is_some_and(|at| Tick(point.tick) >= at) {
-            let _ = self.results.flush(FLUSH_TIMEOUT);
             base.strike();
         }
         let offer = self.offer(logic, base, store, point)?;

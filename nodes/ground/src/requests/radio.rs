@@ -1,7 +1,5 @@
 //! The request manager's topics where there is a radio: what the ground hears and sends, tick by tick.
 
-use std::time::Duration;
-
 use anyhow::Result;
 use swath_mission::link::end::Sent;
 use swath_mission::link::passes::Pass;
@@ -14,9 +12,6 @@ use swath_sim::time::Tick;
 
 use super::ground_end::GroundEnd;
 use super::ways::{all_passes, plan, status};
-
-/// How long the last messages before a fault by order may take to arrive.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// Time between two reports of a radio that is open [s].
 const STATUS_S: f64 = 60.0;
 
@@ -65,7 +60,6 @@ impl RadioSide {
         }
         while let Some(turn) = self.turns.take()? {
             if base.strikes_at().is_some_and(|at| Tick(turn.tick) >= at) {
-                let _ = self.sent.flush(FLUSH_TIMEOUT);
                 base.strike();
             }
             let tick = match base.tick(turn.tick) {

@@ -69,6 +69,7 @@ struct Said {
     heard: Option<msg::CatalogueHeard>,
     sent: Option<msg::RadioSent>,
     offer: Option<msg::UpcomingStrips>,
+    settled: Option<msg::TaskResult>,
 }
 
 struct CatalogueNode {
@@ -124,19 +125,13 @@ impl CatalogueNode {
 
     /// Goes through what the one before has taken in; what that one has said last is said again.
     fn take_up(&mut self, kept: &[Taken]) -> Result<()> {
-        let mut settled = Vec::new();
         for taken in kept {
             for effect in self.apply(taken)? {
-                if let Effect::Settled(record, reward) = &effect {
-                    settled = result_of(taken, record, *reward).into_iter().collect();
-                }
-                self.note(&effect);
+                self.note(taken, &effect);
             }
         }
         if !kept.is_empty() {
             tracing::info!("{} requests are on board", self.logic.catalogue().requests().len());
-            settled.iter().try_for_each(|result| self.results.publish(result))?;
-            self.say_again()?;
         }
         Ok(())
     }
@@ -188,14 +183,14 @@ impl CatalogueNode {
         }
         let over = matches!(&taken, Taken::Point(point) if point.mission_over);
         for effect in self.apply(&taken)? {
-            self.note(&effect);
+            self.note(&taken, &effect);
             match effect {
                 Effect::Heard(_) => self.heard.publish(self.said.heard.as_ref().context("nothing was heard")?)?,
                 Effect::Sent(..) => self.sent.publish(self.said.sent.as_ref().context("nothing was sent")?)?,
                 Effect::Offer(_) if over || !self.offers => {}
                 Effect::Offer(_) => self.upcoming.publish(self.said.offer.as_ref().context("there is no offer")?)?,
-                Effect::Settled(record, reward) => {
-                    result_of(&taken, &record, reward).iter().try_for_each(|result| self.results.publish(result))?;
+                Effect::Settled(..) => {
+                    self.results.publish(self.said.settled.as_ref().context("nothing is settled")?)?
                 }
             }
         }
@@ -219,7 +214,7 @@ impl CatalogueNode {
         })
     }
 
-    fn note(&mut self, effect: &Effect) {
+    fn note(&mut self, taken: &Taken, effect: &Effect) {
         let stamper = &self.base.stamper;
         match effect {
             Effect::Heard(heard) => self.said.heard = Some(messages::catalogue_heard(stamper, heard)),
@@ -229,11 +224,12 @@ impl CatalogueNode {
                 let order = |id| requests.request(id).map(|request| &request.order);
                 self.said.offer = Some(upcoming_strips(stamper, offer, |candidate| order(candidate.id)));
             }
-            Effect::Settled(..) => {}
+            Effect::Settled(record, reward) => self.said.settled = result_of(taken, record, *reward),
         }
     }
 
     fn say_again(&self) -> Result<()> {
+        self.said.settled.iter().try_for_each(|result| self.results.publish(result))?;
         self.said.heard.iter().try_for_each(|heard| self.heard.publish(heard))?;
         Ok(self.said.sent.iter().try_for_each(|sent| self.sent.publish(sent))?)
     }
@@ -255,7 +251,7 @@ impl LifecycleNode for CatalogueNode {
 
     fn activate(&mut self) -> Result<()> {
         self.offers = true;
-        Ok(())
+        self.say_again()
     }
 
     fn deactivate(&mut self) -> Result<()> {

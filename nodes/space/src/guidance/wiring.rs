@@ -34,8 +34,6 @@ const TIMES_ASKED: u32 = 5;
 const PACED_SHARE: f64 = 0.8;
 /// How long, instead of the mission's deadline, a task is waited for whose planner may be started again on the way.
 const RESTARTED: Duration = Duration::from_secs(45);
-/// How long the last messages before a fault by order may take to arrive.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
 /// The file in which guidance keeps what is in hand.
 const KEPT: &str = "guidance.json";
 /// Simulated time between two status messages [s].
@@ -152,7 +150,9 @@ impl GuidanceNode {
         let faults = &self.base.mission.faults;
         let period = self.base.model.period;
         self.nobody_plans = faults.of(Process::Planner, period).into_iter().map(|(it, _)| it).collect();
-        let restarts = !self.nobody_plans.is_empty() || !faults.of(Process::RequestManager, period).is_empty();
+        let who_offers = [Process::RequestManager, Process::Catalogue];
+        let offers_restart = who_offers.iter().any(|&process| !faults.of(process, period).is_empty());
+        let restarts = offers_restart || !self.nobody_plans.is_empty();
         let deadline = Duration::from_secs_f64(if self.pace > 0.0 {
             (PACED_SHARE * period.seconds() / self.pace).max(PACED_PATIENCE.as_secs_f64())
         } else {
@@ -348,8 +348,6 @@ impl GuidanceNode {
                     self.hold_without_planner(point.state.tick)?;
                 }
                 Effect::Strike => {
-                    let _ = self.points.flush(FLUSH_TIMEOUT);
-                    let _ = self.torques.flush(FLUSH_TIMEOUT);
                     self.base.strike();
                 }
             }

@@ -44,9 +44,6 @@ const PROGRAM: Program = Program {
 /// Nothing happens by itself: the node only looks whether it is asked to end.
 const IDLE: Duration = Duration::from_millis(500);
 
-/// How long the last messages before a fault by order may take to arrive.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(5);
-
 /// Runs the planner node until it is asked to end.
 ///
 /// # Errors
@@ -125,7 +122,6 @@ impl PlannerNode {
             let tick = Tick(point.tick);
             self.take_fault_orders()?;
             if self.base.strikes_at().is_some_and(|at| tick >= at) {
-                let _ = self.decisions.flush(FLUSH_TIMEOUT);
                 self.base.strike();
             }
             if self.away.iter().any(|it| it.from <= tick && tick < it.until) {

@@ -261,8 +261,6 @@ impl SpacecraftNode {
 
     fn advance(&mut self) -> Result<()> {
         if self.base.strikes_at().is_some_and(|at| self.logic.now() >= at) {
-            let _ = self.states.flush(FLUSH_TIMEOUT);
-            let _ = self.clock.flush(FLUSH_TIMEOUT);
             self.base.strike();
         }
         let command = self.logic.next_command();
