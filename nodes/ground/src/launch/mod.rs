@@ -1,13 +1,13 @@
 //! The launcher: starts the nodes of a mission, watches them, and leaves its outputs.
 
-mod care;
-mod fleet;
 mod kept;
+mod losses;
 mod output;
 mod over_dds;
 mod process;
 mod progress;
 mod start;
+mod supervisor;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -19,11 +19,11 @@ use swath_sim::time::Tick;
 use swath_sim::vehicle::faults::FOR_GOOD;
 use swath_sim::vehicle::model::Model;
 
-use super::fleet::Fleet;
 use super::kept::{Keeping, KeptFlight};
 use super::output::{Flown, OutputFolder, STORE};
 use super::progress::Progress;
 use super::start::{Wishes, manifest_data, show, start_nodes, start_recorder};
+use super::supervisor::Fleet;
 use crate::alarms::FlyingBoard;
 use swath_mission::alarms::conditions::{Report, of_plan};
 use swath_mission::alarms::{Key, Severity};

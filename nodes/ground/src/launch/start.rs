@@ -8,8 +8,8 @@ use anyhow::{Context, Result};
 use swath_node::out;
 use swath_ros::graph;
 
-use super::fleet::Fleet;
 use super::output::{OutputFolder, STORE};
+use super::supervisor::Fleet;
 use swath_mission::fallback::Policies;
 use swath_mission::file::Mission;
 

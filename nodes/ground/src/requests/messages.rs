@@ -7,7 +7,7 @@ use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome};
 use swath_mission::requests::lifecycle::State;
 use swath_mission::requests::logic::{Abort, RequestLogic};
 use swath_mission::requests::query::{Filter, Opportunity};
-use swath_mission::requests::reason::Reason;
+use swath_mission::requests::reason_number::Reason;
 use swath_mission::requests::refusal::Refusal;
 use swath_mission::requests::request::{Request, Stored};
 use swath_msgs::builtin_interfaces::Time;

@@ -9,7 +9,7 @@ use swath_sim::world::windows::Window;
 use swath_mission::orders::order::{Order, Part};
 use swath_mission::requests::journal::{Added, Attempt, Change, Outcome, Progress, Standing};
 use swath_mission::requests::lifecycle::State;
-use swath_mission::requests::reason::Reason;
+use swath_mission::requests::reason_number::Reason;
 use swath_mission::requests::request::{Request, Stored};
 
 /// Outcomes in the store: 0 for a success, 1 for cancelled, else the reason code of the failure.

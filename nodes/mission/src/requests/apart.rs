@@ -7,7 +7,7 @@ use swath_sim::world::strip::StripId;
 use super::journal::{Attempt, Change, Entry};
 use super::lifecycle::State;
 use super::logic::RequestLogic;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::refusal::Refusal;
 use super::request::SYSTEM;
 use crate::orders::action::{Act, Action};

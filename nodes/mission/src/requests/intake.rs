@@ -9,7 +9,7 @@ use super::duplicates::{is_asked_again, may_be_asked_again};
 use super::journal::{Added, Change, Entry, Standing};
 use super::lifecycle::State;
 use super::logic::RequestLogic;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::refusal::{ATTEMPTS_MAX, CAPACITY, Refusal, TEXT_MAX, check_text};
 use super::request::{Request, SYSTEM};
 use crate::orders::order::Order;

@@ -7,7 +7,7 @@ use swath_sim::world::strip::StripId;
 use swath_sim::world::windows::Window;
 
 use super::lifecycle::State;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use crate::orders::action::Action;
 use crate::orders::order::Order;
 

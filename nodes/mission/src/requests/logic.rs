@@ -17,7 +17,7 @@ use thiserror::Error;
 
 use super::journal::{Change, Entry, InFlight, Progress};
 use super::lifecycle::{IllegalTransition, State};
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::refusal::{Refusal, check_text};
 use super::register::Register;
 use super::request::{GUIDANCE, PLANNER, Request, SYSTEM, Stored};

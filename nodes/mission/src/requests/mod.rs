@@ -8,11 +8,11 @@ pub mod journal;
 pub mod lifecycle;
 pub mod logic;
 pub mod query;
-pub mod reason;
+pub mod reason_number;
 pub mod refusal;
 pub mod register;
 pub mod request;
-pub mod restart;
+pub mod resume;
 mod sharing;
 mod task_reward;
 

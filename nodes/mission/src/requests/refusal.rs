@@ -4,7 +4,7 @@ use swath_sim::error::StripError;
 use thiserror::Error;
 
 use super::lifecycle::IllegalTransition;
-use super::reason::Reason;
+use super::reason_number::Reason;
 
 /// Longest name, reference or reason [characters].
 pub const TEXT_MAX: usize = 256;

@@ -10,7 +10,7 @@ use super::duplicates::{Place, place};
 use super::index::{Area, Index};
 use super::journal::Standing;
 use super::lifecycle::{IllegalTransition, State};
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::request::Request;
 
 /// The requests that have a number.

@@ -6,7 +6,7 @@ use swath_sim::world::windows::Window;
 
 use super::journal::Standing;
 use super::lifecycle::State;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use crate::orders::order::Order;
 
 /// A request that has a number.

@@ -11,7 +11,7 @@ use swath_sim::world::strip::StripId;
 
 use super::lifecycle::State;
 use super::logic::RequestLogic;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::request::SYSTEM;
 
 impl RequestLogic {

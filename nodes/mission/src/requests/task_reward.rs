@@ -7,7 +7,7 @@ use swath_sim::world::strip::StripId;
 use super::journal::{Attempt, Entry, Outcome};
 use super::lifecycle::State;
 use super::logic::RequestLogic;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::request::{GUIDANCE, SYSTEM};
 
 impl RequestLogic {

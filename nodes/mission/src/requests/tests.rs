@@ -15,7 +15,7 @@ use super::journal::{Entry, InFlight};
 use super::lifecycle::State;
 use super::logic::{Abort, RequestLogic, Rules};
 use super::query::Filter;
-use super::reason::Reason;
+use super::reason_number::Reason;
 use super::refusal::Refusal;
 use crate::orders::action::Review;
 use crate::orders::order::{Order, Part};

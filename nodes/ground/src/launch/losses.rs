@@ -8,8 +8,8 @@ use swath_node::fault_orders::ordered;
 use swath_ros::{graph, stamp};
 use swath_sim::time::Tick;
 
-use super::fleet::{Event, Fleet, Happened};
 use super::over_dds::Launcher;
+use super::supervisor::{Event, Fleet, Happened};
 use swath_mission::alarms::conditions::{BAG_FULL, Report, of_plan};
 use swath_mission::fallback::fallback;
 use swath_mission::faults::grammar::{Failure, Process};
