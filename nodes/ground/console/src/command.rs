@@ -9,6 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
 use rustls::ServerConfig;
+use swath_mission::file::Mission;
 use swath_mission::time_text;
 use swath_node::out;
 use swath_ros::{Node, RosArgs, Shutdown, Signal, graph};
@@ -55,7 +56,10 @@ struct ShowArgs {
     /// Address and port; one that other machines reach needs TLS and tokens.
     #[arg(long, default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// What the page calls the mission; its namespace and domain without this.
+    /// File of the mission that flies: its name, its least elevation and its limits.
+    #[arg(long, conflicts_with = "bag")]
+    mission: Option<PathBuf>,
+    /// What the page calls the mission; its name, or its namespace and domain without this.
     #[arg(long)]
     title: Option<String>,
     /// Certificate chain (PEM).
@@ -229,8 +233,12 @@ impl Door {
         let desks = Desks::new(&node)?;
         let (counter, handed_in) = Counter::new();
         let place = || format!("{} in domain {}", node.names().namespace(), node.environment().domain);
-        let title = args.title.clone().unwrap_or_else(place);
-        let elevation_min_deg = SimConfig::default().imaging.elevation_min_deg;
+        let mission = args.mission.as_deref().map(Mission::read).transpose()?;
+        let named = mission.as_ref().map(|mission| mission.name.clone());
+        let title = args.title.clone().or(named).unwrap_or_else(place);
+        let imaging = mission.as_ref().map_or_else(|| SimConfig::default().imaging, |it| it.sim.imaging.clone());
+        let elevation_min_deg = imaging.elevation_min_deg;
+        shared.update(|ledger| mission.iter().for_each(|mission| ledger.know(mission)));
         let told = Some(counter.clone());
         let site = Site { shared: shared.clone(), counter: told, title, elevation_min_deg, guard: self.guard };
         start(self.listener, self.tls, site)?;

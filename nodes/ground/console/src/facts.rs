@@ -10,6 +10,8 @@ use swath_msgs::swath_msgs as msg;
 use swath_node::stamp::nanoseconds;
 use swath_sim::config::RAD_S_PER_RPM;
 
+use crate::telemetry::{Link, Plan, Resources};
+
 /// A fact. Times are ms since 1970-01-01 UTC of simulated time, 0 for none; ticks count from the mission's epoch;
 /// places are longitude and latitude [deg].
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -255,6 +257,13 @@ pub enum Fact {
         /// How often each was started anew; not those that never were.
         restarts: BTreeMap<String, u64>,
     },
+    /// The radio, as the ground knows it; in missions with `[link]`.
+    Link(Link),
+    /// What the satellite is going to do, as the ground predicts it; in missions with `[link]`.
+    Plan(Plan),
+    /// Power, data and momentum as the simulator has them, of which the ground knows only what comes down; in missions
+    /// with `[resources]`.
+    Resources(Resources),
 }
 
 /// A strip that may be imaged next.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde::Serialize;
+use swath_mission::file::Mission;
 use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
@@ -14,6 +15,8 @@ use swath_ros::graph;
 
 use crate::facts::{self, Fact, milliseconds};
 use crate::presence::Presence;
+use crate::telemetry::Newest;
+use crate::ticks::{TICK_MS, TickClock};
 
 /// Most facts that are kept: a week of telemetry every ten seconds with 5 000 requests has a tenth of it.
 const CAPACITY: usize = 5_000_000;
@@ -40,6 +43,7 @@ pub struct Ledger {
     /// Until when an alarm was told to be put aside [ms], by its number.
     until: BTreeMap<u64, f64>,
     presence: Presence,
+    newest: Newest,
     /// How each request stands.
     requests: BTreeMap<u64, msg::StripStatus>,
     tasks: u64,
@@ -53,35 +57,6 @@ struct Line<'a> {
     t: f64,
     #[serde(flatten)]
     fact: &'a Fact,
-}
-
-/// Learns what a tick is from messages that say both tick and time.
-#[derive(Default)]
-struct TickClock {
-    first: Option<(u64, f64)>,
-    told: Option<(f64, f64)>,
-}
-
-/// Length of a tick until two messages have told it [ms]: that of the default control frequency.
-const TICK_MS: f64 = 500.0;
-
-impl TickClock {
-    /// Epoch and length of a tick [ms], if they have changed.
-    fn learn(&mut self, tick: u64, t: f64) -> Option<(f64, f64)> {
-        let (first, at) = *self.first.get_or_insert((tick, t));
-        let tick_ms = match (self.told, tick > first) {
-            (_, true) => (t - at) / (tick - first) as f64,
-            (Some((_, known)), false) => known,
-            (None, false) => TICK_MS,
-        };
-        let learnt = (at - first as f64 * tick_ms, tick_ms);
-        let same = |(epoch, length): (f64, f64)| (epoch - learnt.0).abs() < 1.0 && (length - tick_ms).abs() < 1e-6;
-        if self.told.is_some_and(same) {
-            return None;
-        }
-        self.told = Some(learnt);
-        Some(learnt)
-    }
 }
 
 impl Ledger {
@@ -265,6 +240,44 @@ impl Ledger {
         self.tell_at(&summary.header.stamp, &facts::summary(summary));
     }
 
+    /// The radio, as the ground knows it; said again, it is told once.
+    pub fn link(&mut self, status: &msg::LinkStatus) {
+        self.learn(status.tick, &status.header.stamp);
+        let fact = self.newest.take_link(status);
+        self.tell_news(&status.header.stamp, fact);
+    }
+
+    /// What the satellite is going to do, as the ground predicts it; said again, it is told once.
+    pub fn plan(&mut self, plan: &msg::PredictedPlan) {
+        self.learn(plan.tick, &plan.header.stamp);
+        let fact = self.newest.take_plan(plan);
+        self.tell_news(&plan.header.stamp, fact);
+    }
+
+    /// Power, data and momentum as the simulator has them.
+    pub fn resources(&mut self, state: &msg::ResourceState) {
+        self.learn(state.tick, &state.header.stamp);
+        let fact = self.newest.take_resources(state);
+        self.tell_news(&state.header.stamp, fact);
+    }
+
+    fn tell_news(&mut self, stamp: &Time, fact: Option<Fact>) {
+        if let Some(fact) = fact {
+            self.tell_at(stamp, &fact);
+        }
+    }
+
+    /// What was told last of radio, plan and resources.
+    #[must_use]
+    pub fn newest(&self) -> &Newest {
+        &self.newest
+    }
+
+    /// What the mission says of itself that its messages do not.
+    pub fn know(&mut self, mission: &Mission) {
+        self.newest.know(mission);
+    }
+
     /// Alarms of a mission that nobody keeps. The same one raised again after it was acknowledged stands again.
     pub fn diagnostics(&mut self, array: &DiagnosticArray) {
         if self.kept {
@@ -381,160 +394,4 @@ impl Ledger {
 fn is_alarm(status: &DiagnosticStatus) -> bool {
     let name = status.name.rsplit_once(": ").map(|(_, name)| name);
     status.level != DiagnosticStatus::OK && name != Some(HEALTH)
-}
-
-#[cfg(test)]
-mod tests {
-    use serde_json::{Value, json};
-
-    use super::*;
-
-    const EPOCH_S: i32 = 1_767_225_600;
-
-    fn at(seconds: i32) -> Time {
-        Time { sec: EPOCH_S + seconds, nanosec: 0 }
-    }
-
-    fn ms(seconds: i32) -> f64 {
-        f64::from(EPOCH_S + seconds) * 1000.0
-    }
-
-    fn status(id: u64, state: u8, seconds: i32, tick: u64) -> msg::StripStatus {
-        let mut status = msg::StripStatus { state, tick, ..Default::default() };
-        status.header.stamp = at(seconds);
-        status.strip.id = id;
-        status
-    }
-
-    fn told(ledger: &Ledger) -> Vec<Value> {
-        ledger.after(0, usize::MAX).iter().map(|line| serde_json::from_str(line).unwrap()).collect()
-    }
-
-    fn kinds(ledger: &Ledger) -> Vec<String> {
-        told(ledger).iter().map(|fact| fact["kind"].as_str().unwrap().to_owned()).collect()
-    }
-
-    #[test]
-    fn a_tick_is_learnt_from_two_messages() {
-        let mut ledger = Ledger::default();
-        ledger.summary(&msg::RequestSummary { tick: 40, ..summary_at(10) });
-        ledger.summary(&msg::RequestSummary { tick: 80, ..summary_at(20) });
-        ledger.summary(&msg::RequestSummary { tick: 120, ..summary_at(30) });
-        let clocks: Vec<_> = told(&ledger).into_iter().filter(|fact| fact["kind"] == "clock").collect();
-        assert_eq!(clocks.len(), 2);
-        // A guess by the default of 2 Hz first; then 4 Hz, and tick 0 at the epoch.
-        assert_eq!((&clocks[0]["tick_ms"], &clocks[0]["epoch_ms"]), (&json!(500.0), &json!(ms(-10))));
-        assert_eq!((&clocks[1]["tick_ms"], &clocks[1]["epoch_ms"]), (&json!(250.0), &json!(ms(0))));
-    }
-
-    fn summary_at(seconds: i32) -> msg::RequestSummary {
-        let mut summary = msg::RequestSummary::default();
-        summary.header.stamp = at(seconds);
-        summary
-    }
-
-    #[test]
-    fn a_request_is_told_once_and_each_change_of_it_once() {
-        let mut ledger = Ledger::default();
-        let accepted = status(7, msg::StripStatus::STATE_ACCEPTED, 0, 0);
-        ledger.strip(&accepted);
-        ledger.strip(&accepted);
-        ledger.strip(&status(7, msg::StripStatus::STATE_SCHEDULED, 5, 10));
-        // A list that was asked for before.
-        ledger.strip(&accepted);
-        assert_eq!(ledger.requests()[&7].state, msg::StripStatus::STATE_SCHEDULED);
-        ledger.strip(&status(0, msg::StripStatus::STATE_REJECTED, 5, 10));
-        assert_eq!(kinds(&ledger), ["clock", "strip", "change", "change", "change", "refused"]);
-        for (number, fact) in (1..).zip(told(&ledger)) {
-            assert_eq!(fact["n"], number);
-        }
-    }
-
-    #[test]
-    fn the_past_comes_before_what_is_known_now() {
-        let mut ledger = Ledger::default();
-        let now = status(7, msg::StripStatus::STATE_COMPLETED, 60, 120);
-        ledger.introduce(&now);
-        for (state, seconds) in [(msg::StripStatus::STATE_ACCEPTED, 0), (msg::StripStatus::STATE_COMPLETED, 60)] {
-            ledger.history(&msg::HistoryEntry { strip_id: 7, state, stamp: at(seconds), ..Default::default() });
-        }
-        ledger.strip(&now);
-        // An event that was on its way while the list was read.
-        ledger.strip(&now);
-        assert_eq!(kinds(&ledger), ["clock", "strip", "change", "change", "change"]);
-        assert_eq!(ledger.now_ms(), ms(60));
-    }
-
-    #[test]
-    fn answers_that_are_repeated_count_once() {
-        let mut ledger = Ledger::default();
-        for task in [0, 0, 1, 0] {
-            ledger.task(&msg::ImagingTask { task, ..Default::default() });
-            ledger.result(&msg::TaskResult { task, ..Default::default() });
-            ledger.offer(&msg::UpcomingStrips { task, ..Default::default() });
-        }
-        let kinds = kinds(&ledger);
-        for kind in ["task", "result", "offer"] {
-            assert_eq!(kinds.iter().filter(|it| *it == kind).count(), 2, "{kind}");
-        }
-    }
-
-    #[test]
-    fn alarms_stand_until_they_are_acknowledged_and_again_when_they_are_raised_again() {
-        let mut ledger = Ledger::default();
-        let raise = |ledger: &mut Ledger, name: &str, level: u8| {
-            let status = DiagnosticStatus { name: name.to_owned(), level, ..Default::default() };
-            ledger.diagnostics(&DiagnosticArray { status: vec![status], ..Default::default() });
-        };
-        raise(&mut ledger, "guidance: late", DiagnosticStatus::WARN);
-        raise(&mut ledger, "guidance: well", DiagnosticStatus::OK);
-        raise(&mut ledger, "guidance: health", DiagnosticStatus::WARN);
-        raise(&mut ledger, "planner: lost", DiagnosticStatus::ERROR);
-        assert!(ledger.acknowledge(1, "console"));
-        assert!(!ledger.acknowledge(1, "console"), "it is acknowledged");
-        assert!(!ledger.acknowledge(3, "console"), "there is no such alarm");
-        raise(&mut ledger, "guidance: late", DiagnosticStatus::WARN);
-        assert!(ledger.acknowledge(1, "console"), "it stands again");
-        let numbers: Vec<_> = told(&ledger).iter().map(|fact| (fact["kind"].clone(), fact["alarm"].clone())).collect();
-        let expected = [("alarm", 1), ("alarm", 2), ("acknowledged", 1), ("alarm", 1), ("acknowledged", 1)];
-        assert_eq!(numbers, expected.map(|(kind, alarm)| (json!(kind), json!(alarm))));
-    }
-
-    #[test]
-    fn alarms_that_the_mission_keeps_are_told_as_it_keeps_them() {
-        let mut ledger = Ledger::default();
-        let standing = |state, until| {
-            let (node, name) = ("guidance".to_owned(), "late".to_owned());
-            let alarm = msg::Alarm { node, name, severity: 2, state, shelved_until: at(until), ..Default::default() };
-            msg::StandingAlarms { alarms: vec![alarm], ..Default::default() }
-        };
-        let event = |event, actor: &str| {
-            let (node, name, actor) = ("guidance".to_owned(), "late".to_owned(), actor.to_owned());
-            msg::AlarmEvent { node, name, event, actor, text: "known".to_owned(), ..Default::default() }
-        };
-        // Who comes late hears what stands first; what nodes say is no alarm of its own then.
-        ledger.standing(&standing(msg::Alarm::STATE_ACKNOWLEDGED, 0));
-        let status = DiagnosticStatus { level: DiagnosticStatus::WARN, ..Default::default() };
-        ledger.diagnostics(&DiagnosticArray { status: vec![status], ..Default::default() });
-        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_RETURNED, "guidance"));
-        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_RAISED, "guidance"));
-        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_SHELVED, "ada"));
-        ledger.standing(&standing(msg::Alarm::STATE_SHELVED, 60));
-        ledger.standing(&standing(msg::Alarm::STATE_SHELVED, 60));
-        ledger.alarm_event(&event(msg::AlarmEvent::EVENT_UNSHELVED, "ada"));
-        assert_eq!(ledger.kept_alarm(1), Some(("guidance".to_owned(), "late".to_owned())));
-        assert_eq!(ledger.kept_alarm(2), None);
-        let all = told(&ledger);
-        let kinds: Vec<_> = all.iter().map(|fact| fact["kind"].as_str().unwrap()).collect();
-        assert_eq!(kinds, ["alarm", "acknowledged", "returned", "alarm", "shelved", "shelved"]);
-        assert_eq!((&all[4]["actor"], &all[4]["until_ms"]), (&json!("ada"), &json!(ms(60))));
-        assert_eq!(all[5]["until_ms"], json!(0.0));
-    }
-
-    #[test]
-    fn a_point_that_is_nowhere_is_not_told() {
-        let mut ledger = Ledger::default();
-        ledger.point(&NavSatFix { latitude: f64::NAN, ..Default::default() });
-        assert_eq!(ledger.last(), 0);
-    }
 }

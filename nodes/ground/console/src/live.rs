@@ -34,6 +34,9 @@ pub struct Ear {
     standing: Subscription<msg::StandingAlarms>,
     alarm_events: Subscription<msg::AlarmEvent>,
     diagnostics: Subscription<DiagnosticArray>,
+    link: Subscription<msg::LinkStatus>,
+    plans: Subscription<msg::PredictedPlan>,
+    resources: Subscription<msg::ResourceState>,
     looked: Option<Instant>,
 }
 
@@ -57,6 +60,9 @@ impl Ear {
             standing: node.subscription(&graph::STANDING_ALARMS)?,
             alarm_events: node.subscription(&graph::ALARM_EVENTS)?,
             diagnostics: node.subscription(&graph::DIAGNOSTICS)?,
+            link: node.subscription(&graph::LINK_STATUS)?,
+            plans: node.subscription(&graph::PREDICTED_PLAN)?,
+            resources: node.subscription(&graph::RESOURCES)?,
             looked: None,
         })
     }
@@ -77,6 +83,9 @@ impl Ear {
             drain(&self.results, |it| ledger.result(&it))?;
             drain(&self.planner, |it| ledger.planner(&it))?;
             drain(&self.summaries, |it| ledger.summary(&it))?;
+            drain(&self.link, |it| ledger.link(&it))?;
+            drain(&self.plans, |it| ledger.plan(&it))?;
+            drain(&self.resources, |it| ledger.resources(&it))?;
             drain(&self.alarm_events, |it| ledger.alarm_event(&it))?;
             drain(&self.standing, |it| ledger.standing(&it))?;
             drain(&self.diagnostics, |it| ledger.diagnostics(&it))

@@ -27,7 +27,8 @@ pub struct Recording {
 /// When the bag cannot be read, or holds no mission of this namespace.
 pub fn read(path: &Path, namespace: &str, ledger: &mut Ledger) -> Result<Recording> {
     let bag = Bag::open(path)?;
-    let recording = recording(&bag).with_context(|| format!("{} holds no mission", path.display()))?;
+    let mission = mission(&bag).with_context(|| format!("{} holds no mission", path.display()))?;
+    ledger.know(&mission);
     let readers = readers(&bag, namespace.trim_end_matches('/'))?;
     let names: Vec<String> = bag.topics().iter().map(|topic| topic.topic.name.clone()).collect();
     let wanted: Vec<String> =
@@ -43,7 +44,7 @@ pub fn read(path: &Path, namespace: &str, ledger: &mut Ledger) -> Result<Recordi
             reader(ledger, message.data).with_context(|| format!("{} at {time} ns", names[message.topic]))?;
         }
     }
-    Ok(recording)
+    Ok(Recording { title: mission.name, elevation_min_deg: mission.sim.imaging.elevation_min_deg })
 }
 
 /// Tells the ledger of a message of one topic.
@@ -75,6 +76,9 @@ fn readers(bag: &Bag, namespace: &str) -> Result<Vec<Option<Reader>>> {
             _ if is(graph::PLANNER_DECISION.entry) => reader(topic, Ledger::choice)?,
             _ if is(graph::PLANNER_STATUS.entry) => reader(topic, Ledger::planner)?,
             _ if is(graph::REQUEST_SUMMARY.entry) => reader(topic, Ledger::summary)?,
+            _ if is(graph::LINK_STATUS.entry) => reader(topic, Ledger::link)?,
+            _ if is(graph::PREDICTED_PLAN.entry) => reader(topic, Ledger::plan)?,
+            _ if is(graph::RESOURCES.entry) => reader(topic, Ledger::resources)?,
             _ if is(graph::STANDING_ALARMS.entry) => reader(topic, Ledger::standing)?,
             _ if is(graph::ALARM_EVENTS.entry) => reader(topic, Ledger::alarm_event)?,
             _ if is(graph::DIAGNOSTICS.entry) => reader(topic, Ledger::diagnostics)?,
@@ -102,9 +106,66 @@ fn reader<M: RosMessage + 'static>(topic: &Topic, tell: impl Fn(&mut Ledger, &M)
     }))
 }
 
-fn recording(bag: &Bag) -> Result<Recording> {
+fn mission(bag: &Bag) -> Result<Mission> {
     let manifest = bag.metadata_named(MANIFEST).with_context(|| format!("no metadata record {MANIFEST}"))?;
     let text = manifest.get(MANIFEST_TEXT).with_context(|| format!("{MANIFEST} has no entry {MANIFEST_TEXT}"))?;
-    let mission: Mission = toml::from_str(text).with_context(|| format!("{MANIFEST} is no mission"))?;
-    Ok(Recording { title: mission.name.clone(), elevation_min_deg: mission.sim.imaging.elevation_min_deg })
+    toml::from_str(text).with_context(|| format!("{MANIFEST} is no mission"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use serde_json::{Value, json};
+    use swath_bags::{BagOptions, BagWriter};
+    use swath_ros::encode;
+
+    use super::*;
+
+    const MISSION: &str =
+        "name = \"of tests\"\n[link]\nstations = [\"awarua\"]\n[resources]\nwheel_momentum_max_nms = 8.0\n";
+    const EPOCH_S: i32 = 1_767_225_600;
+
+    fn write<M: RosMessage>(bag: &BagWriter, topic: &graph::Topic<M>, message: &M) {
+        let entry = topic.entry;
+        let name = format!("/swath/{}", entry.name);
+        let topic = Topic::new(&name, entry.type_name, M::SCHEMA, "", Vec::new()).unwrap();
+        bag.write(bag.add_topic(&topic).unwrap(), 1, 1, encode(message).unwrap().as_bytes()).unwrap();
+    }
+
+    fn header(seconds: i32) -> swath_msgs::std_msgs::Header {
+        let mut header = swath_msgs::std_msgs::Header::default();
+        header.stamp.sec = EPOCH_S + seconds;
+        header
+    }
+
+    #[test]
+    fn radio_plan_and_resources_are_read_from_a_bag() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bag");
+        let bag = BagWriter::create(&path, BagOptions::default()).unwrap();
+        bag.add_metadata(MANIFEST, BTreeMap::from([(MANIFEST_TEXT.to_owned(), MISSION.to_owned())]));
+        let link = msg::LinkStatus { header: header(10), tick: 20, open: true, imaged: 4, ..Default::default() };
+        write(&bag, &graph::LINK_STATUS, &link);
+        let tasks = vec![msg::PredictedTask { task: 3, strip_id: 9, start_tick: 100, ..Default::default() }];
+        let plan =
+            msg::PredictedPlan { header: header(11), tick: 22, compared: 5, equal: 4, tasks, ..Default::default() };
+        write(&bag, &graph::PREDICTED_PLAN, &plan);
+        let (charge, capacity, wheel_momentum) = (9.0, 12.0, 6.0);
+        let state =
+            msg::ResourceState { header: header(20), tick: 40, charge, capacity, wheel_momentum, ..Default::default() };
+        write(&bag, &graph::RESOURCES, &state);
+        bag.close().unwrap();
+
+        let mut ledger = Ledger::default();
+        assert_eq!(read(&path, "/swath", &mut ledger).unwrap().title, "of tests");
+        let facts: Vec<Value> =
+            ledger.after(0, usize::MAX).iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let of = |kind: &str| facts.iter().find(|fact| fact["kind"] == kind).unwrap();
+        assert_eq!((&of("link")["open"], &of("link")["imaged"]), (&json!(true), &json!(4)));
+        assert_eq!((&of("plan")["equal"], &of("plan")["tasks"][0]["strip"]), (&json!(4), &json!(9)));
+        // The limit is the recorded mission's.
+        let resources = of("resources");
+        assert_eq!((&resources["battery"], &resources["momentum"]), (&json!(0.75), &json!(0.75)));
+    }
 }

@@ -76,7 +76,7 @@ pub fn fly(
         start_recorder(&mut fleet, mission_file, &output.path().join("bag"), &namespace, words, &wishes)?;
     }
     if let Some(address) = wishes.console {
-        show(&mut fleet, &mission.name, &namespace, address)?;
+        show(&mut fleet, mission_file, &namespace, address)?;
     }
     start_nodes(&mut fleet, mission_file, &namespace, output, wishes)?;
     launcher.keep()?;

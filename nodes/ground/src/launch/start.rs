@@ -75,8 +75,9 @@ pub(super) fn manifest_data(mission: &Mission, namespace: &str, policies: &Polic
 }
 
 /// Starts the console and says where it is. It is not asked for anything: a mission flies on without it.
-pub(super) fn show(fleet: &mut Fleet, title: &str, namespace: &str, address: SocketAddr) -> Result<()> {
-    let words = [format!("--listen={address}"), format!("--title={title}"), format!("--namespace={namespace}")];
+pub(super) fn show(fleet: &mut Fleet, mission_file: &Path, namespace: &str, address: SocketAddr) -> Result<()> {
+    let mission = text(mission_file)?;
+    let words = [format!("--listen={address}"), format!("--mission={mission}"), format!("--namespace={namespace}")];
     fleet.start_beside(graph::CONSOLE, "swath-console", &words)?;
     out::say(format_args!("console: {}", fleet.wait_for_line(graph::CONSOLE, START_TIMEOUT)?));
     Ok(())

@@ -4,6 +4,7 @@ mod alarms;
 mod answers;
 mod planner;
 mod strips;
+mod telemetry;
 
 use std::sync::Arc;
 
@@ -44,6 +45,7 @@ pub fn routes() -> OpenApiRouter<Arc<Server>> {
         .merge(strips::routes())
         .merge(planner::routes())
         .merge(alarms::routes())
+        .merge(telemetry::routes())
 }
 
 /// Whether what is sent to a path changes nothing, so that viewers may.

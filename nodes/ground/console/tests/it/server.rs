@@ -97,6 +97,32 @@ fn the_log_tells_the_sample_mission() {
 }
 
 #[test]
+fn what_the_mission_does_not_have_is_not_told() {
+    for (path, what) in [("/api/link", "radio"), ("/api/plan", "predicted"), ("/api/resources", "resources")] {
+        let (status, head, body) = ask("GET", path, "", "");
+        assert_eq!(status, 404, "{path}");
+        assert!(head.contains("application/problem+json") && body.contains(what), "{head}\n{body}");
+    }
+    let kinds = ["link", "plan", "resources"];
+    assert!(!log().iter().any(|fact| kinds.contains(&fact["kind"].as_str().unwrap())));
+}
+
+#[test]
+fn what_is_told_of_radio_and_resources_is_described() {
+    let described = serde_json::to_value(swath_console::description()).unwrap();
+    for (path, answer, of, field) in [
+        ("/api/link", "LinkNow", "RadioLink", "passes"),
+        ("/api/plan", "PlanNow", "PredictedPlan", "tasks"),
+        ("/api/resources", "ResourcesNow", "Resources", "battery"),
+    ] {
+        let answers = &described["paths"][path]["get"]["responses"];
+        let body = &answers["200"]["content"]["application/json"]["schema"]["$ref"];
+        assert_eq!(body, &Value::from(format!("#/components/schemas/{answer}")), "{path}");
+        assert!(described["components"]["schemas"][of]["properties"][field].is_object(), "{of}");
+    }
+}
+
+#[test]
 fn a_reader_goes_on_where_it_was() {
     let begins = |body: &str| body.split("data: [{\"n\":").nth(1).and_then(|rest| rest.split(',').next()?.parse().ok());
     let (status, head, body) = ask("GET", "/api/facts", "", "");
