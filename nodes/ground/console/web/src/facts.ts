@@ -171,6 +171,74 @@ export interface NodesFact extends Head {
   restarts: Record<string, number>;
 }
 
+export interface Pass {
+  station: string;
+  rise_ms: number;
+  set_ms: number;
+  elevation_deg: number;
+}
+
+export interface LinkFact extends Head {
+  kind: "link";
+  open: boolean;
+  waiting_orders: number;
+  waiting_changes: number;
+  on_board: number;
+  imaged: number;
+  delivered: number;
+  frames_sent: number;
+  frames_heard: number;
+  frames_damaged: number;
+  /** Tick on board that housekeeping tells of. */
+  housekeeping: number | null;
+  housekeeping_task: number;
+  housekeeping_pending: number;
+  housekeeping_imaged: number;
+  passes: Pass[];
+}
+
+export interface Planned {
+  task: number;
+  strip: number;
+  start: number;
+  imaging: number;
+  end: number;
+  success: boolean;
+  known: number;
+}
+
+export interface PlanFact extends Head {
+  kind: "plan";
+  since: number;
+  until: number;
+  tasks: Planned[];
+  left_out: number;
+  compared: number;
+  equal: number;
+  imaged: number;
+  foretold: number;
+  partings: number;
+  parted_task: number;
+  parted: number;
+  parted_reason: string;
+}
+
+/** As the simulator has it; shares are of 1. */
+export interface ResourcesFact extends Head {
+  kind: "resources";
+  battery: number;
+  illumination: number;
+  generated_w: number;
+  load_w: number;
+  storage: number;
+  to_send_bits: number;
+  in_contact: boolean;
+  momentum_nms: number;
+  /** None where nobody has said what its limit is. */
+  momentum: number | null;
+  safe_mode: string;
+}
+
 export type Fact =
   | ClockFact
   | StripFact
@@ -189,4 +257,7 @@ export type Fact =
   | ReturnedFact
   | AcknowledgedFact
   | ShelvedFact
-  | NodesFact;
+  | NodesFact
+  | LinkFact
+  | PlanFact
+  | ResourcesFact;

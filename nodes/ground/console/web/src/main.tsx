@@ -4,11 +4,12 @@ import { effect, signal } from "@preact/signals";
 import { render } from "preact";
 import { Alarms, standing } from "./alarms";
 import { begin, login, told } from "./api";
+import { Link, LinkPill } from "./link";
 import { WorldMap } from "./map";
 import { Planner } from "./planner";
 import { Plots } from "./plots";
 import { onlyState, Requests } from "./requests";
-import { connected, heard, info, locked, message, panel, shown, wall, world } from "./store";
+import { connected, hasRadio, heard, info, locked, message, panel, shown, wall, world } from "./store";
 import "./style.css";
 import { COMPLETED, ACCEPTED, EXPIRED, FAILED, HELD } from "./states";
 import { Submit } from "./submit";
@@ -19,10 +20,19 @@ import { lastAt } from "./world";
 /** Silence of a flying mission that is worth a word [ms]. */
 const SILENCE = 20000;
 
-const PANELS: { name: string; commands: boolean; show: () => preact.JSX.Element }[] = [
+/** A panel: who sees it, and in which missions. */
+interface Panel {
+  name: string;
+  commands: boolean;
+  show: () => preact.JSX.Element;
+  here?: () => boolean;
+}
+
+const PANELS: Panel[] = [
   { name: "requests", commands: false, show: Requests },
   { name: "submit", commands: true, show: Submit },
   { name: "planner", commands: false, show: Planner },
+  { name: "link", commands: false, show: Link, here: () => hasRadio.value },
   { name: "alarms", commands: false, show: Alarms },
 ];
 
@@ -42,6 +52,7 @@ function Header() {
       {!connected.value && <span class="pill bad" role="status">no connection to the console's server</span>}
       {connected.value && silence > SILENCE && <span class="pill warn" role="status">no news for {Math.round(silence / 1000)} s</span>}
       {missing.length > 0 && <span class="pill bad" role="alert">missing: {missing.join(", ")}</span>}
+      {hasRadio.value && <LinkPill />}
       {caller && <span class="dim">{caller}{!info.value.commands && " · looks only"}</span>}
       <button class={count.length ? (count.some((it) => it.level > 1) ? "pill bad" : "pill warn") : "pill"} onClick={() => (panel.value = "alarms")}>
         {count.length} alarm{count.length === 1 ? "" : "s"}
@@ -99,7 +110,7 @@ function open(name: string): void {
 
 function App() {
   if (locked.value) return <Locked />;
-  const panels = PANELS.filter((it) => info.value.commands || !it.commands);
+  const panels = PANELS.filter((it) => (info.value.commands || !it.commands) && (it.here?.() ?? true));
   const Shown = (panels.find((it) => it.name === panel.value) ?? panels[0]!).show;
   return (
     <>

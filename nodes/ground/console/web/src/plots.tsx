@@ -1,16 +1,19 @@
-// Curves on the timeline's axis: attitude error while imaging, and the wheels' speeds.
+// Curves on the timeline's axis: attitude error while imaging, the wheels' speeds, and resources where there are some.
 
 import { effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { shown, span, version, world } from "./store";
+import type { ResourcesFact } from "./facts";
+import { hasResources, shown, span, version, world } from "./store";
 import { stamp } from "./time";
 import { GUTTER } from "./timeline";
 
 interface Curve {
   label: string;
   colour: string;
+  /** Told apart by more than colour where several are of one kind. */
+  dash?: number[];
 }
 
 interface PlotProps {
@@ -18,6 +21,13 @@ interface PlotProps {
   curves: Curve[];
   data: () => uPlot.AlignedData;
 }
+
+/** What the simulator has of them: the ground knows only what comes down. */
+const RESOURCES: Curve[] = [
+  { label: "battery (truth)", colour: "#f0e442" },
+  { label: "storage (truth)", colour: "#56b4e9", dash: [8, 3] },
+  { label: "momentum of its limit (truth)", colour: "#cc79a7", dash: [2, 3] },
+];
 
 const HEIGHT = 86;
 /** Width of a plot's name, which stands beside its axis [px]. */
@@ -38,7 +48,7 @@ function options(title: string, curves: Curve[], width: number): uPlot.Options {
     ],
     series: [
       { label: "time", value: (_, value) => (value == null ? "" : stamp(value * 1000)) },
-      ...curves.map((curve) => ({ label: curve.label, stroke: curve.colour, width: 1.4, points: { show: false }, value: (_: uPlot, value: number | null) => (value == null ? "" : value.toPrecision(3)) })),
+      ...curves.map((curve) => ({ label: curve.label, stroke: curve.colour, dash: curve.dash, width: 1.4, points: { show: false }, value: (_: uPlot, value: number | null) => (value == null ? "" : value.toPrecision(3)) })),
     ],
   };
 }
@@ -87,6 +97,12 @@ export function Plots() {
     const part = shownPart(world.value.wheels);
     return [part.map(({ t }) => t / 1000), ...[0, 1, 2].map((axis) => part.map((it) => it.rpm[axis] ?? null))] as uPlot.AlignedData;
   };
+  const resources = () => {
+    const part = shownPart(world.value.resources);
+    const percent = (share: number | null) => (share === null ? null : share * 100);
+    const of = (pick: (it: ResourcesFact) => number | null) => part.map((it) => percent(pick(it)));
+    return [part.map(({ t }) => t / 1000), of((it) => it.battery), of((it) => it.storage), of((it) => it.momentum)] as uPlot.AlignedData;
+  };
   return (
     <>
       <Plot title="‖σ‖" curves={[{ label: "attitude error", colour: "#e69f00" }]} data={error} />
@@ -99,6 +115,7 @@ export function Plots() {
         ]}
         data={wheels}
       />
+      {hasResources.value && <Plot title="% · truth" curves={RESOURCES} data={resources} />}
     </>
   );
 }

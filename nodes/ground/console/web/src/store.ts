@@ -53,6 +53,10 @@ export const message = signal("");
 /** The time that is shown [ms]. */
 export const shown = computed(() => cursor.value ?? world.value.now);
 
+/** Whether the mission has a radio, and whether it has resources. */
+export const hasRadio = computed(() => world.value.links.length > 0);
+export const hasResources = computed(() => world.value.resources.length > 0);
+
 /** The span of the time axis [ms]. */
 export const axis = signal<[number, number] | null>(null);
 export const span = computed<[number, number]>(() => {

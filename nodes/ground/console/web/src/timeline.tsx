@@ -1,30 +1,27 @@
-// The timeline: tasks as planned and flown, windows of what is selected, alarms; the curves below share its axis.
+// The timeline: tasks as planned and flown, passes and the ground's plan, windows of what is selected, alarms; the curves below share its axis.
 
+import { useComputed } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { onCanvas } from "./map";
+import { foretold, layout, ROW, type Band, type Bands } from "./radio";
 import { lookOf } from "./states";
-import { axis, cursor, focus, info, select, selected, shown, span, version, world } from "./store";
+import { axis, cursor, focus, hasRadio, info, select, selected, shown, span, version, world } from "./store";
 import { clock, duration, stamp } from "./time";
-import { lastAt, type Task, type World } from "./world";
+import { lastAt, type World } from "./world";
 
 /** Width of the names of bands, and of the plots' axes [px]. */
 export const GUTTER = 78;
-const ROW = 22;
-/** Where bands begin, and how high each is [px]: of windows there are many. */
-const BANDS = { tasks: [0, ROW], windows: [ROW, 42], selected: [ROW + 42, ROW], alarms: [2 * ROW + 42, ROW] } as const;
-type Band = keyof typeof BANDS;
-const HEIGHT = 3 * ROW + 42 + 20;
-
 interface Scene {
   context: CanvasRenderingContext2D;
   x: (t: number) => number;
   width: number;
+  bands: Bands;
 }
 
-function bar({ context, x }: Scene, band: Band, from: number, to: number, colour: string, hollow = false): void {
+function bar({ context, x, bands }: Scene, band: Band, from: number, to: number, colour: string, hollow = false): void {
   const [left, wide] = [Math.max(GUTTER, x(from)), Math.max(2, x(to) - Math.max(GUTTER, x(from)))];
   if (x(to) < GUTTER) return;
-  const [top, high] = BANDS[band];
+  const { top, high } = bands[band];
   context.fillStyle = context.strokeStyle = colour;
   context.lineWidth = 1;
   if (hollow) context.strokeRect(left + 0.5, top + 4.5, wide - 1, high - 9);
@@ -46,22 +43,23 @@ function tasks(scene: Scene, now: World, t: number): void {
     const colour = selected.value.has(task.strip) ? "#ff00ff" : failed ? "#d55e00" : task.result && end <= t ? "#17b88a" : "#f0e442";
     bar(scene, "tasks", start, Math.min(turn, end), `${colour}66`);
     if (end > turn) bar(scene, "tasks", turn, end, colour, Boolean(failed));
-    label(scene, turn, end, now.strips.get(task.strip)?.name ?? "");
+    label(scene, "tasks", turn, end, now.strips.get(task.strip)?.name ?? "");
   }
 }
 
 /** A name on a bar, where there is room for it. */
-function label({ context, x }: Scene, from: number, to: number, text: string): void {
+function label({ context, x, bands }: Scene, band: Band, from: number, to: number, text: string, light = false): void {
   const left = Math.max(GUTTER, x(from));
   const room = x(to) - left - 6;
   if (room < 24) return;
   context.save();
   context.beginPath();
-  context.rect(left, 0, room + 3, ROW);
+  const { top } = bands[band];
+  context.rect(left, top, room + 3, ROW);
   context.clip();
-  context.fillStyle = "#06110d";
+  context.fillStyle = light ? "#dbe5ec" : "#06110d";
   context.font = "10px system-ui, sans-serif";
-  context.fillText(text, left + 3, 14.5);
+  context.fillText(text, left + 3, top + 14.5);
   context.restore();
 }
 
@@ -71,7 +69,7 @@ function offered(scene: Scene, now: World, t: number): void {
   if (!offer) return;
   const choice = now.choices.get(offer.task);
   const chosen = choice && choice.t <= t ? choice.candidates[choice.chosen] : undefined;
-  const [top, high] = BANDS.windows;
+  const { top, high } = scene.bands.windows;
   const step = Math.min(4, (high - 4) / Math.max(1, offer.candidates.length));
   const { context, x } = scene;
   offer.candidates.forEach(({ strip, open, close }, i) => {
@@ -88,7 +86,7 @@ function proposal(scene: Scene, now: World, t: number): void {
   if (!status || status.proposal_state !== "open") return;
   bar(scene, "tasks", t, now.time(status.close), "#e69f0055");
   bar(scene, "tasks", t, now.time(status.close), "#e69f00", true);
-  label(scene, t, now.time(status.close), `approve ${status.name}?`);
+  label(scene, "tasks", t, now.time(status.close), `approve ${status.name}?`);
   if (status.deadline) bar(scene, "tasks", now.time(status.deadline), now.time(status.deadline), "#ff8a7a");
 }
 
@@ -106,15 +104,32 @@ function windows(scene: Scene, now: World, t: number): void {
   }
 }
 
-function marks({ context, x, width }: Scene, [from, to]: [number, number]): void {
+/** Passes that were known of: those over pale, those to come hollow; and what the ground had predicted, beside what was flown. */
+function radio(scene: Scene, now: World, t: number): void {
+  for (const pass of now.passes.values()) {
+    if (pass.t > t || scene.x(pass.set_ms) < GUTTER || scene.x(pass.rise_ms) > scene.width) continue;
+    const [over, ahead] = [pass.set_ms <= t, pass.rise_ms > t];
+    bar(scene, "passes", pass.rise_ms, pass.set_ms, over ? "#56b4e966" : "#56b4e9", ahead);
+    label(scene, "passes", pass.rise_ms, pass.set_ms, `${pass.station} ${pass.elevation_deg.toFixed(0)}°`, over || ahead);
+  }
+  for (const task of foretold(now, t, span.value)) {
+    const [start, imaging, end] = [now.time(task.start), now.time(task.imaging), now.time(task.end)];
+    const colour = selected.value.has(task.strip) ? "#ff00ff" : task.success ? "#8fb8d8" : "#d55e00";
+    bar(scene, "plan", start, imaging, `${colour}55`);
+    bar(scene, "plan", imaging, end, colour, !task.success);
+    label(scene, "plan", imaging, end, now.strips.get(task.strip)?.name ?? "", !task.success);
+  }
+}
+
+function marks({ context, x, width, bands }: Scene, [from, to]: [number, number]): void {
   const steps = [10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 21600, 86400].map((seconds) => seconds * 1000);
   const step = steps.find((size) => ((to - from) / size) * 70 < width - GUTTER) ?? 86400000;
   context.font = "11px system-ui, sans-serif";
   for (let at = Math.ceil(from / step) * step; at <= to; at += step) {
     context.fillStyle = "#1b2b3a";
-    context.fillRect(x(at), 0, 1, HEIGHT - 16);
+    context.fillRect(x(at), 0, 1, bands.height - 16);
     context.fillStyle = "#9fb4c7";
-    context.fillText(clock(at), x(at) - 22, HEIGHT - 5);
+    context.fillText(clock(at), x(at) - 22, bands.height - 5);
   }
 }
 
@@ -123,35 +138,41 @@ function draw(canvas: HTMLCanvasElement): void {
   if (!context) return;
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth;
+  const [now, t] = [world.value, shown.value];
+  const bands = layout(now);
   canvas.width = width * ratio;
-  canvas.height = HEIGHT * ratio;
+  canvas.height = bands.height * ratio;
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   const [from, to] = span.value;
   const x = (t: number) => GUTTER + ((t - from) / (to - from)) * (width - GUTTER);
-  const scene = { context, x, width };
-  context.clearRect(0, 0, width, HEIGHT);
+  const scene = { context, x, width, bands };
+  context.clearRect(0, 0, width, bands.height);
   marks(scene, [from, to]);
-  const [now, t] = [world.value, shown.value];
   tasks(scene, now, t);
+  radio(scene, now, t);
   proposal(scene, now, t);
   windows(scene, now, t);
   context.fillStyle = "#0d141b";
-  context.fillRect(0, 0, GUTTER - 2, HEIGHT);
+  context.fillRect(0, 0, GUTTER - 2, bands.height);
   context.fillStyle = "#9fb4c7";
-  for (const [name, [top, high]] of Object.entries(BANDS)) {
-    context.fillText(name, 6, top + 15);
+  for (const { name, top, high } of bands.shown) {
+    // With a radio the ground knows of tasks only what comes down.
+    context.fillText(name === "tasks" && hasRadio.value ? "tasks · truth" : name, 6, top + 15);
     context.fillStyle = "#1b2b3a";
     context.fillRect(0, top + high - 0.5, width, 0.5);
     context.fillStyle = "#9fb4c7";
   }
   context.fillStyle = cursor.value === null ? "#ffffff" : "#ff00ff";
-  if (x(t) >= GUTTER) context.fillRect(x(t), 0, 1.5, HEIGHT);
+  if (x(t) >= GUTTER) context.fillRect(x(t), 0, 1.5, bands.height);
 }
 
-function taskUnder(t: number): Task | undefined {
+/** The strip of the task, flown or predicted, under a place of the timeline; 0 for none. */
+function stripUnder(y: number, t: number): number {
   const now = world.value;
-  const task = now.taskAt(t);
-  return task && now.time(task.end ?? task.start + task.t_pre + task.rest) >= t ? task : undefined;
+  const band = layout(now).shown.find(({ top, high }) => y >= top && y < top + high)?.name;
+  if (band === "plan") return foretold(now, shown.value, [t, t]).at(-1)?.strip ?? 0;
+  const task = band === "tasks" ? now.taskAt(t) : undefined;
+  return task && now.time(task.end ?? task.start + task.t_pre + task.rest) >= t ? task.strip : 0;
 }
 
 function zoom(at: number, factor: number): void {
@@ -168,6 +189,7 @@ export function look(t: number | null): void {
 
 export function Timeline() {
   const canvas = useRef<HTMLCanvasElement>(null);
+  const height = useComputed(() => layout(world.value).height);
   const held = useRef<{ x: number; moved: boolean } | null>(null);
   useEffect(() => {
     const read = () => [version, shown, span, selected, focus, cursor, info].forEach((it) => it.value);
@@ -181,7 +203,7 @@ export function Timeline() {
     <canvas
       ref={canvas}
       class="timeline"
-      height={HEIGHT}
+      height={height}
       tabIndex={0}
       aria-label="Timeline; arrow keys step through time, + and - zoom, Home returns to now"
       onKeyDown={(event) => {
@@ -212,8 +234,8 @@ export function Timeline() {
       onPointerUp={(event) => {
         if (held.current && !held.current.moved && event.offsetX > GUTTER) {
           const t = timeAt(event.offsetX);
-          const task = event.offsetY < ROW ? taskUnder(t) : undefined;
-          if (task?.strip) select(task.strip, event.shiftKey || event.ctrlKey);
+          const strip = stripUnder(event.offsetY, t);
+          if (strip) select(strip, event.shiftKey || event.ctrlKey);
           else look(t);
         }
         held.current = null;

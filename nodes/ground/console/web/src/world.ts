@@ -30,6 +30,11 @@ export interface Alarm extends f.AlarmFact {
   aside?: f.ShelvedFact;
 }
 
+/** A pass, and when it was told of first. */
+export interface KnownPass extends f.Pass {
+  t: number;
+}
+
 /** The last of a list that is ordered by time which was true at `t`. */
 export function lastAt<T extends { t: number }>(list: readonly T[], t: number): T | undefined {
   let [low, high] = [0, list.length];
@@ -63,6 +68,11 @@ export class World {
   readonly summaries: f.SummaryFact[] = [];
   readonly refused: f.RefusedFact[] = [];
   readonly alarms = new Map<number, Alarm>();
+  readonly links: f.LinkFact[] = [];
+  readonly plans: f.PlanFact[] = [];
+  readonly resources: f.ResourcesFact[] = [];
+  /** Passes that were told of, by station and rise. */
+  readonly passes = new Map<string, KnownPass>();
   /** Which nodes are there, and how often each has come back. */
   nodes: f.NodesFact | undefined;
 
@@ -151,6 +161,19 @@ export class World {
       }
       case "nodes":
         this.nodes = fact;
+        break;
+      case "link":
+        insert(this.links, fact);
+        for (const pass of fact.passes) {
+          const key = `${pass.station} ${pass.rise_ms}`;
+          if (!this.passes.has(key)) this.passes.set(key, { ...pass, t: fact.t });
+        }
+        break;
+      case "plan":
+        insert(this.plans, fact);
+        break;
+      case "resources":
+        insert(this.resources, fact);
         break;
     }
   }
