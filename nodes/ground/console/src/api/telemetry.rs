@@ -67,3 +67,23 @@ async fn resources(State(server): Home) -> Result<Json<ResourcesNow>, Problem> {
     let (t, resources) = newest.ok_or_else(|| Problem::unknown("nothing has been told of resources"))?;
     Ok(Json(ResourcesNow { t, resources }))
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    #[test]
+    fn what_is_told_of_radio_and_resources_is_described() {
+        let described = serde_json::to_value(crate::description()).unwrap();
+        for (path, answer, of, field) in [
+            ("/api/link", "LinkNow", "RadioLink", "passes"),
+            ("/api/plan", "PlanNow", "PredictedPlan", "tasks"),
+            ("/api/resources", "ResourcesNow", "Resources", "battery"),
+        ] {
+            let answers = &described["paths"][path]["get"]["responses"];
+            let body = &answers["200"]["content"]["application/json"]["schema"]["$ref"];
+            assert_eq!(body, &Value::from(format!("#/components/schemas/{answer}")), "{path}");
+            assert!(described["components"]["schemas"][of]["properties"][field].is_object(), "{of}");
+        }
+    }
+}
