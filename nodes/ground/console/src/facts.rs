@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use swath_msgs::builtin_interfaces::Time;
 use swath_msgs::diagnostic_msgs::DiagnosticStatus;
 use swath_msgs::sensor_msgs::{JointState, NavSatFix};
 use swath_msgs::swath_msgs as msg;
-use swath_node::stamp::nanoseconds;
 use swath_sim::config::RAD_S_PER_RPM;
 
 use crate::telemetry::{Link, Plan, Resources};
+use crate::ticks::milliseconds;
 
 /// A fact. Times are ms since 1970-01-01 UTC of simulated time, 0 for none; ticks count from the mission's epoch;
 /// places are longitude and latitude [deg].
@@ -277,12 +276,6 @@ pub struct Candidate {
     pub close: u64,
     /// Acquisition [ticks].
     pub t_acq: u32,
-}
-
-/// A time [ms since 1970-01-01 UTC], 0 for none.
-#[must_use]
-pub fn milliseconds(time: &Time) -> f64 {
-    nanoseconds(time) as f64 / 1e6
 }
 
 /// A request as it was made.

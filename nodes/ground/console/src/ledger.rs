@@ -13,10 +13,10 @@ use swath_node::health::HEALTH;
 use swath_node::stamp::nanoseconds;
 use swath_ros::graph;
 
-use crate::facts::{self, Fact, milliseconds};
+use crate::facts::{self, Fact};
+use crate::newest::Newest;
 use crate::presence::Presence;
-use crate::telemetry::Newest;
-use crate::ticks::{TICK_MS, TickClock};
+use crate::ticks::{TICK_MS, TickClock, milliseconds};
 
 /// Most facts that are kept: a week of telemetry every ten seconds with 5 000 requests has a tenth of it.
 const CAPACITY: usize = 5_000_000;

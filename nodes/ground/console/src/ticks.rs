@@ -1,4 +1,13 @@
-//! What a tick is, as messages tell it.
+//! What times are as numbers, and what a tick is, as messages tell it.
+
+use swath_msgs::builtin_interfaces::Time;
+use swath_node::stamp::nanoseconds;
+
+/// A time [ms since 1970-01-01 UTC], 0 for none.
+#[must_use]
+pub fn milliseconds(time: &Time) -> f64 {
+    nanoseconds(time) as f64 / 1e6
+}
 
 /// Learns what a tick is from messages that say both tick and time.
 #[derive(Default)]

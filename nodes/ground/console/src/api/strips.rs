@@ -15,11 +15,11 @@ use utoipa_axum::routes;
 
 use super::answers::DOOR;
 use crate::extract::{Json, Named};
-use crate::facts::milliseconds;
 use crate::guard::Caller;
 use crate::numbers::wholes;
 use crate::problem::Problem;
 use crate::server::{Home, Server};
+use crate::ticks::milliseconds;
 use crate::wishes;
 
 pub(super) fn routes() -> OpenApiRouter<Arc<Server>> {
