@@ -7,7 +7,7 @@ use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pythonize::pythonize;
 use serde_json::json;
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::geojson::feature_of;
 use swath_mission::orders::import::import;
 use swath_mission::orders::order::Order;

@@ -14,8 +14,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
-use swath_mission::orders::cutting::Cutting;
 use swath_mission::orders::feature::{Feature, Part};
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::import::{features, import_features};
 use swath_sim::config::SimConfig;
 

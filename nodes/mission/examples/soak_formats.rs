@@ -12,7 +12,7 @@ use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::import::import;
 use swath_sim::config::SimConfig;
 

@@ -16,7 +16,7 @@ use anyhow::{Context, Result, ensure};
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::json;
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::formats::{self, Source};
 use swath_mission::orders::import::import_features;
 use swath_sim::config::SimConfig;

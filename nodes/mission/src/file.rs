@@ -24,7 +24,7 @@ use thiserror::Error;
 use crate::approval::ApprovalConfig;
 use crate::faults::{FaultPlan, FaultPlanError};
 use crate::link::config::{LinkConfig, LinkConfigError};
-use crate::orders::cutting::{Cutting, SWATH_KM};
+use crate::orders::feature_strips::{Cutting, SWATH_KM};
 use crate::orders::found::Fault;
 use crate::orders::import::{RequestsFileError, import};
 use crate::orders::order::Order;

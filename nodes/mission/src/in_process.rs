@@ -247,8 +247,8 @@ impl InProcessMission {
             return Ok(None);
         }
         let decided_at = self.mission.now();
-        let command_lost = self.link().is_some_and(|apart| apart.space().command_lost(decided_at));
-        let held = self.faults.hold(decided_at, planner).or(command_lost.then_some(self.faults.hold));
+        let holds = self.link().is_some_and(|apart| apart.space().holds(decided_at));
+        let held = self.faults.hold(decided_at, planner).or(holds.then_some(self.faults.hold));
         let (decision, delay) = match held {
             Some(ticks) => (self.mission.decide(&mut Nobody { ticks })?, 0),
             None => (self.mission.decide(planner)?, self.mission.planning_delay()),

@@ -6,7 +6,7 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use rand::{RngExt as _, SeedableRng as _};
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::formats::{self, Source};
 use swath_mission::orders::found::Import;
 use swath_mission::orders::import::{import, import_features};

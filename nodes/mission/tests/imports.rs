@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use rand::{RngExt as _, SeedableRng as _};
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::formats::{self, Source};
 use swath_mission::orders::found::{Import, Shown};
 use swath_mission::orders::import::import_features;
 use swath_mission::orders::order::Order;
 use swath_mission::orders::short_lines::ShortLines;
-use swath_mission::shapes::cover::shows;
+use swath_mission::shapes::cover_area::shows;
 use swath_mission::shapes::sphere::{Arc, direction};
 use swath_sim::config::SimConfig;
 

@@ -149,6 +149,17 @@ fn without_commands_the_satellite_images_nothing_until_it_hears_again() {
 }
 
 #[test]
+fn a_satellite_that_is_to_go_on_without_commands_images_what_is_on_board_and_says_that_it_hears_nobody() {
+    let stations = "stations = [\"puertollano\", \"awarua\", \"punta-arenas\"]";
+    let silent = format!("{stations}\ncommand_loss_h = 1.0\ncommand_loss_mode = \"continue\"");
+    let (tasks, mut flight) = flown(&mission(8.0, 1500, 2, &silent), Vec::new());
+    let journal = flight.board().take_journal();
+    assert!(!journal.is_empty() && journal.iter().all(|it| it.key.name == "ground silent"), "{}", journal.len());
+    let (never_lost, _) = flown(&mission(8.0, 1500, 2, stations), Vec::new());
+    assert_eq!(tasks, never_lost);
+}
+
+#[test]
 fn changes_in_time_count_and_late_ones_are_answered_so() {
     let mut mission = mission(5.0, 600, 1, "mode = \"always\"\nprocessing_s = 5.0\nloss = 0.1");
     with_an_end(&mut mission, 5.0);

@@ -3,7 +3,7 @@
 use swath_mission::approval::Mode;
 use swath_mission::orders::action::Review;
 use swath_mission::orders::action::{Act, Action};
-use swath_mission::orders::cutting::{Cutting, SWATH_KM};
+use swath_mission::orders::feature_strips::{Cutting, SWATH_KM};
 use swath_mission::orders::order::{Order, Part};
 use swath_mission::orders::rows::Passes;
 use swath_msgs::builtin_interfaces::Time;

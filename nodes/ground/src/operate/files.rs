@@ -13,8 +13,8 @@ use swath_ros::{RosArgs, graph};
 use swath_sim::config::SimConfig;
 
 use super::client::Operator;
-use swath_mission::orders::cutting::Cutting;
 use swath_mission::orders::feature::{Feature, Part};
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::formats::Features;
 use swath_mission::orders::found::{Cut, Import, Shown};
 use swath_mission::orders::import::{features, import_features, write};

@@ -1,7 +1,7 @@
 //! Messages about strip requests: values that come in are checked by the request manager, each with its reason.
 
 use swath_mission::orders::action::Review;
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::requests::index::Area;
 use swath_mission::requests::journal::{Attempt, Change, InFlight, Outcome};
 use swath_mission::requests::lifecycle::State;

@@ -3,10 +3,10 @@
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::{Value, json};
-use swath_mission::orders::cutting::Cutting;
 use swath_mission::orders::feature::Part;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::found::{Import, Shown};
-use swath_mission::shapes::cover::shows;
+use swath_mission::shapes::cover_area::shows;
 use swath_mission::shapes::sphere::{Place, angle, direction};
 
 /// Points that hit an area, at most.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
-use swath_mission::orders::cutting::Cutting;
+use swath_mission::orders::feature_strips::Cutting;
 use swath_mission::orders::found::Import;
 use swath_mission::shapes::sphere::{ANTIPODAL_ARC, Arc, Place, Plane, angle, between, direction};
 

@@ -169,7 +169,7 @@ pub const DEFINITIONS: &[Definition] = &[
         Severity::Error,
         [
             "the satellite has heard no frame from the ground for `command_loss_h`",
-            "it holds its attitude and images nothing until it hears one",
+            "it holds its attitude and images nothing until it hears one (`command_loss_mode`: it goes on)",
             "look at the next passes (`swath passes`) and at the stations",
         ],
     ),

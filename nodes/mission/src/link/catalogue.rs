@@ -6,7 +6,7 @@ use swath_sim::vehicle::flight::Situation;
 use swath_sim::vehicle::initial::InitialState;
 use swath_sim::world::strip::StripId;
 
-use super::config::LinkConfig;
+use super::config::{CommandLossMode, LinkConfig};
 use super::end::{Counts, End, Rates, Sent};
 use super::ground::Known;
 use super::message::{Down, HOUSEKEEPING, Housekeeping, IMAGES, RESULTS, Up, Wish, item, message};
@@ -27,8 +27,9 @@ pub struct Catalogue {
     end: End,
     rates: Rates,
     strip_bits: u64,
-    /// Time without a frame from the ground after which nothing is imaged [ticks].
+    /// Time without a frame from the ground after which it is lost [ticks].
     command_loss: Option<u64>,
+    command_loss_mode: CommandLossMode,
     /// When a frame from the ground was heard last.
     heard: Tick,
     /// How often housekeeping is sent [ticks], and when it was last.
@@ -48,6 +49,7 @@ impl Catalogue {
             rates,
             strip_bits: config.strip_bits as u64,
             command_loss: config.command_loss_h.map(|hours| u64::from(period.ticks_ceil(hours * 3600.0))),
+            command_loss_mode: config.command_loss_mode,
             heard: Tick(0),
             housekeeping: (u64::from(period.ticks_ceil(HOUSEKEEPING_S)), None),
             misread: 0,
@@ -102,10 +104,16 @@ impl Catalogue {
         self.misread
     }
 
-    /// Whether nothing was heard of the ground for so long that nothing may be imaged.
+    /// Whether nothing was heard of the ground for so long that it is lost.
     #[must_use]
     pub fn command_lost(&self, now: Tick) -> bool {
         self.command_loss.is_some_and(|patience| now.0.saturating_sub(self.heard.0) >= patience)
+    }
+
+    /// Whether nothing is imaged because the ground is lost.
+    #[must_use]
+    pub fn holds(&self, now: Tick) -> bool {
+        self.command_loss_mode == CommandLossMode::Hold && self.command_lost(now)
     }
 
     /// When a frame from the ground was heard last; the epoch before any.

@@ -44,10 +44,13 @@ pub struct LinkConfig {
     pub loss: f64,
     /// Data of an imaged strip [bit]; 0 for images that need not come down.
     pub strip_bits: f64,
-    /// Simulated time without a frame from the ground after which the satellite holds its attitude and images nothing,
-    /// until it hears one [h]; it never does without it.
+    /// Simulated time without a frame from the ground after which the ground is taken to be lost, until one is heard [h];
+    /// it never is without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command_loss_h: Option<f64>,
+    /// What the satellite does then.
+    #[serde(skip_serializing_if = "CommandLossMode::is_default")]
+    pub command_loss_mode: CommandLossMode,
     /// How far ahead the ground predicts what the satellite is going to do [h], 0 for no prediction. Without it 12 h, and
     /// nothing in lockstep, where nobody looks.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,8 +70,27 @@ impl Default for LinkConfig {
             loss: 0.0,
             strip_bits: 200e6,
             command_loss_h: None,
+            command_loss_mode: CommandLossMode::default(),
             prediction_h: None,
         }
+    }
+}
+
+/// What a satellite does that hears nothing of the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandLossMode {
+    /// It holds its attitude and images nothing.
+    #[default]
+    Hold,
+    /// It goes on with what is on board, and raises the alarm.
+    Continue,
+}
+
+impl CommandLossMode {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
     }
 }
 
@@ -209,6 +231,8 @@ mod tests {
         let sim = SimConfig { resources: Some(toml::from_str("").unwrap()), ..SimConfig::default() };
         let error = LinkConfig { mode: LinkMode::Always, ..LinkConfig::default() }.validate(&sim).unwrap_err();
         assert!(error.to_string().starts_with("strip_bits is 200000000, but with [resources]"), "{error}");
+        let mode = toml::from_str::<LinkConfig>("command_loss_mode = \"sleep\"").unwrap_err().to_string();
+        assert!(mode.contains("unknown variant `sleep`, expected `hold` or `continue`"), "{mode}");
         assert!(toml::from_str::<LinkConfig>("station = 1").unwrap_err().to_string().contains("unknown field"));
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::cutting::Cutting;
+use super::feature_strips::Cutting;
 use super::formats::{self, Beside, Features, FormatError, Source};
 use super::found::{Fault, Import};
 use super::geojson::feature_of;

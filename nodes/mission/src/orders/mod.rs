@@ -1,8 +1,8 @@
 //! What is asked for: orders, the files that they come in, and what else operators ask.
 
 pub mod action;
-pub mod cutting;
 pub mod feature;
+pub mod feature_strips;
 pub mod formats;
 pub mod found;
 pub mod geojson;

@@ -3,8 +3,8 @@
 use sha2::{Digest as _, Sha256};
 use swath_sim::world::strip::StripRequest;
 
-use super::cutting::{CutStrip, Cutting, Outline};
 use super::feature::{Feature, Part};
+use super::feature_strips::{CutStrip, Cutting, Outline};
 use super::found::{Cut, Import, Shown};
 use super::geojson::feature_of;
 use super::order::{MISSION, Order, Part as OrderPart, rounded};

@@ -161,9 +161,9 @@ impl CatalogueLogic {
             self.settle(record, &mut effects);
         }
         self.send_up_to(now, &mut effects);
-        let lost = self.catalogue.command_lost(now);
+        let holds = self.catalogue.holds(now);
         let offer = self.catalogue.on_decision_point(point.task, &point.situation);
-        if lost {
+        if holds {
             self.told.hold = Some(point.task);
             effects.push(Effect::Heard(self.told.clone()));
         } else {

@@ -9,7 +9,7 @@ use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::story::{Story, Strip, Task};
+use super::story::{Resources, Story, Strip, Task};
 use crate::debrief::places::{Place, cut_at_antimeridian};
 
 /// Imaged, and successful.
@@ -22,10 +22,12 @@ pub const AMBER: RGBColor = RGBColor(255, 187, 88);
 pub const GREY: RGBColor = RGBColor(140, 140, 140);
 /// The satellite's way, and sums.
 pub const BLUE: RGBColor = RGBColor(31, 119, 180);
+/// What was predicted.
+const PURPLE: RGBColor = RGBColor(148, 103, 189);
 /// Land.
 const SAND: RGBColor = RGBColor(232, 228, 218);
 /// One for each axis.
-const AXES: [(&str, RGBColor); 3] = [("x", BLUE), ("y", RGBColor(255, 127, 14)), ("z", RGBColor(148, 103, 189))];
+const AXES: [(&str, RGBColor); 3] = [("x", BLUE), ("y", RGBColor(255, 127, 14)), ("z", PURPLE)];
 
 const WIDTH: u32 = 1120;
 const FONT: &str = "sans-serif";
@@ -159,6 +161,18 @@ pub fn timeline(story: &Story) -> Result<String> {
                 );
             }
         }
+        for (spans, (low, high), colour) in [
+            (story.radio.passes.iter().map(|pass| (pass.rise_s, pass.set_s)).collect(), (-0.13, -0.02), BLUE),
+            (story.radio.foretold(), (-0.98, -0.87), PURPLE),
+        ] {
+            let spans: Vec<(f64, f64)> = spans;
+            for (from, to) in spans.into_iter().map(|(from, to)| (from, to.min(story.end_s))) {
+                bars.extend(
+                    rows_of(from, to, orbit)
+                        .map(|(row, a, b)| Rectangle::new([(a, -row + low), (b, -row + high)], colour.filled())),
+                );
+            }
+        }
         chart.draw_series(bars).map_err(failed)?;
         Ok(())
     })
@@ -209,6 +223,18 @@ pub fn wheels(story: &Story, series: &[Vec<(f64, f64)>; 3], limit: f64, name: &s
         }
         let end = story.end_s;
         line(&mut chart, &[(0.0, limit), (end, limit), (end, -limit), (0.0, -limit)], RED, "limit")?;
+        legend(&mut chart)
+    })
+}
+
+/// Shares of battery, storage and momentum over time.
+pub fn resources(end_s: f64, resources: &Resources) -> Result<String> {
+    draw(300, |area| {
+        let mut chart = chart(area, 0.0..end_s, 0.0..110.0, ("time [s]", "share [%]"))?;
+        line(&mut chart, &resources.illumination, GREY, "sunlight")?;
+        line(&mut chart, &resources.charge, GREEN, "battery")?;
+        line(&mut chart, &resources.storage, BLUE, "storage")?;
+        line(&mut chart, &resources.momentum, AMBER, "momentum")?;
         legend(&mut chart)
     })
 }

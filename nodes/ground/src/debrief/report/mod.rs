@@ -4,6 +4,7 @@ mod alarms;
 mod figures;
 mod markup;
 mod page;
+mod radio;
 mod story;
 
 use std::fs;

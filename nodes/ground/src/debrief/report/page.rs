@@ -31,6 +31,7 @@ pub fn page(recorded: &Recorded, story: &Story) -> Result<String> {
     facts(&mut html, recorded, story);
     orders(&mut html, story);
     alarms::tables(&mut html, recorded)?;
+    story.radio.tables(&mut html);
     plots(&mut html, story)?;
     tasks(&mut html, story);
     decisions(&mut html, recorded);
@@ -94,7 +95,13 @@ fn plots(html: &mut String, story: &Story) -> Result<()> {
     let torque = (&story.wheel_torque, story.wheel_torque_max_Nm, "wheel torque [N m]");
     let map = "Ground track (blue) and strips: imaged (green), tried in vain (red), not tried (grey). \
                Coastlines: Natural Earth.";
-    let timeline = "Tasks: transition (amber), imaging with success (green) or without (red), waiting (grey).";
+    let timeline = match story.radio.passes.is_empty() && story.radio.plans.is_empty() {
+        true => "Tasks: transition (amber), imaging with success (green) or without (red), waiting (grey).",
+        false => {
+            "Tasks: transition (amber), imaging with success (green) or without (red), waiting (grey). Above them \
+             passes (blue), below them imaging as the ground had predicted it (purple)."
+        }
+    };
     for (id, title, svg) in [
         ("map", map, figures::map(story)?),
         ("timeline", timeline, figures::timeline(story)?),
@@ -105,6 +112,12 @@ fn plots(html: &mut String, story: &Story) -> Result<()> {
         ("requests", "Strip requests by state.", figures::requests(story)?),
     ] {
         _ = writeln!(html, "<figure id=\"{id}\">\n<figcaption>{title}</figcaption>\n{svg}</figure>");
+    }
+    if let Some(resources) = &story.resources {
+        let title =
+            "Battery, storage and the wheel with most momentum, as shares of what there is room for; grey: sunlight.";
+        let svg = figures::resources(story.end_s, resources)?;
+        _ = writeln!(html, "<figure id=\"resources\">\n<figcaption>{title}</figcaption>\n{svg}</figure>");
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use swath_msgs::swath_msgs as msg;
 use swath_ros::graph;
 use swath_sim::config::RAD_S_PER_RPM;
 
+use super::radio::RadioStory;
 use crate::debrief::export::track::Track;
 use crate::debrief::places::{Place, strip_places};
 use crate::debrief::recorded::Recorded;
@@ -48,6 +49,22 @@ pub struct Story {
     pub wheel_torque: [Points; 3],
     /// Strip requests in each state that occurs.
     pub requests: Vec<(&'static str, Points)>,
+    /// The radio between ground and satellite, if there is one.
+    pub radio: RadioStory,
+    /// Power, data and momentum, if the mission has them.
+    pub resources: Option<Resources>,
+}
+
+/// Power, data and momentum over time.
+pub struct Resources {
+    /// Charge of the battery, as a share of its capacity [%].
+    pub charge: Points,
+    /// Storage in use, as a share of all [%].
+    pub storage: Points,
+    /// Momentum of the wheel that has most, as a share of its limit [%].
+    pub momentum: Points,
+    /// Share of the Sun's disc that is seen [%].
+    pub illumination: Points,
 }
 
 /// A task.
@@ -122,6 +139,8 @@ impl Story {
             wheel_speed: wheel_speed.map(|points| thinned(&points)),
             wheel_torque: wheel_torque.map(|points| thinned(&points)),
             requests: requests(recorded)?,
+            radio: RadioStory::of(recorded)?,
+            resources: resources(recorded)?,
         })
     }
 }
@@ -180,6 +199,28 @@ fn requests(recorded: &Recorded) -> Result<Vec<(&'static str, Points)>> {
     })?;
     series.retain(|(_, points)| points.iter().any(|(_, count)| *count > 0.0));
     Ok(series)
+}
+
+/// How power, data and momentum stood.
+fn resources(recorded: &Recorded) -> Result<Option<Resources>> {
+    let Some(config) = &recorded.model.config.resources else { return Ok(None) };
+    if !recorded.has(&graph::RESOURCES) {
+        return Ok(None);
+    }
+    let mut told = <[Points; 4]>::default();
+    recorded.for_each(&graph::RESOURCES, |state| {
+        let time_s = state.tick as f64 * recorded.model.period.seconds();
+        let shares = [
+            state.charge / state.capacity,
+            state.stored_bits as f64 / state.storage_bits.max(1) as f64,
+            state.wheel_momentum / config.wheel_momentum_max_nms,
+            state.illumination,
+        ];
+        told.iter_mut().zip(shares).for_each(|(points, share)| points.push((time_s, 100.0 * share)));
+        Ok(())
+    })?;
+    let [charge, storage, momentum, illumination] = told.map(|points| thinned(&points));
+    Ok(Some(Resources { charge, storage, momentum, illumination }))
 }
 
 /// The same line in few points: of each portion the least and the greatest, so that no peak is lost.

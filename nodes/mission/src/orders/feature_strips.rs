@@ -4,8 +4,8 @@ use swath_sim::config::SimConfig;
 
 use super::rows::{Passes, Rows};
 use super::short_lines::{Numbered, ShortLines, joined};
-use crate::shapes::cover::{Cover, Headings, Polygon, Swath, cover};
-use crate::shapes::follow::{Limits, follow};
+use crate::shapes::cover_area::{Cover, Headings, Polygon, Swath, cover};
+use crate::shapes::cut_line::{Limits, follow};
 use crate::shapes::sphere::{ANTIPODAL_ARC, Arc, Place, angle, direction, place};
 
 /// How lines and areas become strips.
@@ -119,7 +119,7 @@ impl Cutting {
             return Ok(as_it_is);
         }
         let total: f64 = followed.pieces.iter().map(|piece| piece.length).sum();
-        let end = |end: crate::shapes::follow::End| end.vertex.map_or_else(|| place(&end.direction), |i| places[i]);
+        let end = |end: crate::shapes::cut_line::End| end.vertex.map_or_else(|| place(&end.direction), |i| places[i]);
         let strips = followed.pieces.iter().map(|piece| {
             let strip = CutStrip { start: end(piece.start), end: end(piece.end), share: piece.length / total };
             self.stretched(strip)

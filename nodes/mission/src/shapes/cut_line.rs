@@ -414,5 +414,5 @@ fn hull(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 #[cfg(test)]
-#[path = "follow_tests.rs"]
+#[path = "cut_line_tests.rs"]
 mod tests;

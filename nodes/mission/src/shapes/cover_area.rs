@@ -429,5 +429,5 @@ fn nearer_than(mut intervals: Vec<[f64; 2]>, gap: f64) -> Vec<[f64; 2]> {
 }
 
 #[cfg(test)]
-#[path = "cover_tests.rs"]
+#[path = "cover_area_tests.rs"]
 mod tests;
