@@ -220,8 +220,9 @@ impl MissionNode {
 
     /// The fault that was ordered for this node befalls it now, once what it has sent has arrived.
     pub fn strike(&self) -> ! {
-        let _ = self.node.flush(FLUSH_TIMEOUT);
+        // Told first: whoever does not acknowledge must not have it befall the next one again.
         self.node.tell_struck(self.struck);
+        let _ = self.node.flush(FLUSH_TIMEOUT);
         match self.ordered.front() {
             Some((_, Failure::Hang)) => loop {
                 std::thread::sleep(Duration::from_secs(3600));

@@ -2,7 +2,7 @@
 //! be replaced by another one while the node runs.
 
 use std::any::Any;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
@@ -87,10 +87,11 @@ impl Dds {
         slots.push(slot);
     }
 
-    /// Waits until every reliable reader has all samples of all writers, and tells whether that is so.
-    pub(crate) fn flush(&self, timeout: Duration) -> bool {
+    /// Waits until every reliable reader has all samples of these writers, and tells whether that is so.
+    pub(crate) fn flush(&self, writers: &BTreeSet<Gid>, timeout: Duration) -> bool {
         let deadline = Instant::now() + timeout;
-        let slots: Vec<Arc<dyn Slot>> = lock(&self.slots).iter().filter_map(Weak::upgrade).collect();
+        let mut slots: Vec<Arc<dyn Slot>> = lock(&self.slots).iter().filter_map(Weak::upgrade).collect();
+        slots.retain(|slot| writers.contains(&slot.gid()));
         slots.iter().all(|slot| slot.flush(deadline.saturating_duration_since(Instant::now())))
     }
 

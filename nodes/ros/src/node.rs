@@ -248,10 +248,11 @@ impl Node {
         Ok(Subscription::new(raw, topic.entry.writers, drops))
     }
 
-    /// Waits until every reliable reader has all that this node has sent, and tells whether that is so.
+    /// Waits until every reliable reader has all that this node has sent on topics of the table, and tells whether that
+    /// is so.
     #[must_use]
     pub fn flush(&self, timeout: Duration) -> bool {
-        self.dds.flush(timeout)
+        self.dds.flush(&self.roster.writers_of_table(), timeout)
     }
 
     /// Drops a share of the messages that come again when they are not answered, drawn from a seed: a fault by order.

@@ -408,6 +408,13 @@ impl Roster {
         lock(&self.state).yields_to.is_some()
     }
 
+    /// This node's writers on topics of the table.
+    pub(crate) fn writers_of_table(&self) -> BTreeSet<Gid> {
+        let state = lock(&self.state);
+        let writers = state.table.iter().filter(|(direction, ..)| *direction == Direction::Write);
+        writers.map(|(_, gid, _)| *gid).collect()
+    }
+
     /// What is missing, in words, until these nodes (as the table names them) are matched on all topics that they have
     /// in common with this one.
     pub(crate) fn missing(&self, nodes: &[&str]) -> Vec<String> {
