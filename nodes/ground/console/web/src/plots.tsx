@@ -4,7 +4,7 @@ import { effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import type { ResourcesFact } from "./facts";
+import { percents } from "./resources";
 import { hasResources, shown, span, version, world } from "./store";
 import { stamp } from "./time";
 import { GUTTER } from "./timeline";
@@ -99,9 +99,7 @@ export function Plots() {
   };
   const resources = () => {
     const part = shownPart(world.value.resources);
-    const percent = (share: number | null) => (share === null ? null : share * 100);
-    const of = (pick: (it: ResourcesFact) => number | null) => part.map((it) => percent(pick(it)));
-    return [part.map(({ t }) => t / 1000), of((it) => it.battery), of((it) => it.storage), of((it) => it.momentum)] as uPlot.AlignedData;
+    return [part.map(({ t }) => t / 1000), ...percents(part)] as uPlot.AlignedData;
   };
   return (
     <>
