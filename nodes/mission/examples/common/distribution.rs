@@ -21,6 +21,8 @@ pub struct Panel {
 
 const FONT: &str = "sans-serif";
 const SIZE: (u32, u32) = (1120, 420);
+/// Points of a curve.
+const POINTS: u32 = 480;
 /// Until then [h].
 const END_H: f64 = 24.0;
 const COLOURS: [RGBColor; 4] =
@@ -35,7 +37,7 @@ pub fn draw(path: &Path, panels: &[Panel]) -> Result<()> {
     let _ = plotters::style::register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE).map_err(failed)?;
-    for (place, panel) in area.split_evenly((1, panels.len())).iter().zip(panels) {
+    for (at, (place, panel)) in area.split_evenly((1, panels.len())).iter().zip(panels).enumerate() {
         let builder = &mut ChartBuilder::on(place);
         let builder = builder.caption(panel.step, (FONT, 18)).margin(10).x_label_area_size(40).y_label_area_size(52);
         let mut chart = builder.build_cartesian_2d(0.0..END_H, 0.0..100.0).map_err(failed)?;
@@ -47,6 +49,10 @@ pub fn draw(path: &Path, panels: &[Panel]) -> Result<()> {
             let swatch = move |(x, y)| Rectangle::new([(x, y - 3), (x + 12, y + 3)], colour.filled());
             let series = LineSeries::new(points, colour.stroke_width(2));
             chart.draw_series(series).map_err(failed)?.label(curve.name).legend(swatch);
+        }
+        // There is room for the names of the links in the first of them.
+        if at > 0 {
+            continue;
         }
         let mut labels = chart.configure_series_labels();
         labels.position(SeriesLabelPosition::LowerRight).background_style(WHITE.mix(0.85)).label_font((FONT, 13));
@@ -60,7 +66,7 @@ fn steps(curve: &Curve) -> Vec<(f64, f64)> {
     let mut hours = curve.hours.clone();
     hours.sort_by(f64::total_cmp);
     let share = |count: usize| 100.0 * count as f64 / curve.orders.max(1) as f64;
-    let points = (0..=1200).map(|at| f64::from(at) * END_H / 1200.0);
+    let points = (0..=POINTS).map(|at| f64::from(at) * END_H / f64::from(POINTS));
     points.map(|hour| (hour, share(hours.partition_point(|it| *it <= hour)))).collect()
 }
 
