@@ -38,6 +38,9 @@ pub enum Ending {
 
 /// A process that runs, and the lines that it says.
 pub struct Running {
+    /// Its number. It is kept here for both kinds: where `pid` matched on them, rustc 1.95 made code that looked for the
+    /// number of a process that was not there, and the launcher crashed.
+    pid: u32,
     process: Process,
     /// What it says on its stdout, or to whoever listens after that.
     pub lines: Receiver<String>,
@@ -56,7 +59,7 @@ impl Running {
             Some(stdout) => listen(stdout),
             None => channel().1,
         };
-        Ok(Self { process: Process::Child(child), lines })
+        Ok(Self { pid: child.id(), process: Process::Child(child), lines })
     }
 
     /// Takes over a process that a launcher before has started, if it is there; it speaks at `signs`.
@@ -67,15 +70,12 @@ impl Running {
         // Open for writing too, it has no end when the process ends, and opening it waits for nobody.
         let signs = OpenOptions::new().read(true).write(true).open(signs);
         let signs: File = signs.with_context(|| format!("cannot listen to process {}", name.pid))?;
-        Ok(Some(Self { process: Process::Left(name), lines: listen(signs) }))
+        Ok(Some(Self { pid: name.pid, process: Process::Left(name), lines: listen(signs) }))
     }
 
     /// Its number.
     pub fn pid(&self) -> u32 {
-        match &self.process {
-            Process::Child(child) => child.id(),
-            Process::Left(name) => name.pid,
-        }
+        self.pid
     }
 
     /// Its name, if it runs.
