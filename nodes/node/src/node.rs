@@ -159,7 +159,8 @@ impl MissionNode {
         self.node.set_drops(self.mission.seed, drops.into_iter().map(dropping).collect());
     }
 
-    /// A node that was started again says nothing before the recorder hears it, for as long as that may take.
+    /// A node that was started again in a recorded mission says nothing before the recorder hears it; it waits for it at
+    /// most [`RECORDER_TIMEOUT`].
     ///
     /// # Errors
     /// When the node may not go on.

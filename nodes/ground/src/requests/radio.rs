@@ -12,6 +12,7 @@ use swath_sim::time::Tick;
 
 use super::ground_end::GroundEnd;
 use super::ways::{all_passes, plan, status};
+
 /// Time between two reports of a radio that is open [s].
 const STATUS_S: f64 = 60.0;
 

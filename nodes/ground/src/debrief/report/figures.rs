@@ -22,7 +22,7 @@ pub const AMBER: RGBColor = RGBColor(255, 187, 88);
 pub const GREY: RGBColor = RGBColor(140, 140, 140);
 /// The satellite's way, and sums.
 pub const BLUE: RGBColor = RGBColor(31, 119, 180);
-/// What was predicted.
+/// What was predicted, and the z axis.
 const PURPLE: RGBColor = RGBColor(148, 103, 189);
 /// Land.
 const SAND: RGBColor = RGBColor(232, 228, 218);
@@ -161,17 +161,13 @@ pub fn timeline(story: &Story) -> Result<String> {
                 );
             }
         }
-        for (spans, (low, high), colour) in [
-            (story.radio.passes.iter().map(|pass| (pass.rise_s, pass.set_s)).collect(), (-0.13, -0.02), BLUE),
-            (story.radio.foretold(), (-0.98, -0.87), PURPLE),
-        ] {
-            let spans: Vec<(f64, f64)> = spans;
-            for (from, to) in spans.into_iter().map(|(from, to)| (from, to.min(story.end_s))) {
-                bars.extend(
-                    rows_of(from, to, orbit)
-                        .map(|(row, a, b)| Rectangle::new([(a, -row + low), (b, -row + high)], colour.filled())),
-                );
-            }
+        let passes = story.radio.passes.iter().map(|pass| (pass.rise_s, pass.set_s, -0.13, BLUE));
+        let foretold = story.radio.foretold().into_iter().map(|(from, to)| (from, to, -0.98, PURPLE));
+        for (from, to, low, colour) in passes.chain(foretold) {
+            bars.extend(
+                rows_of(from, to.min(story.end_s), orbit)
+                    .map(|(row, a, b)| Rectangle::new([(a, -row + low), (b, -row + low + 0.11)], colour.filled())),
+            );
         }
         chart.draw_series(bars).map_err(failed)?;
         Ok(())

@@ -95,16 +95,14 @@ fn plots(html: &mut String, story: &Story) -> Result<()> {
     let torque = (&story.wheel_torque, story.wheel_torque_max_Nm, "wheel torque [N m]");
     let map = "Ground track (blue) and strips: imaged (green), tried in vain (red), not tried (grey). \
                Coastlines: Natural Earth.";
-    let timeline = match story.radio.passes.is_empty() && story.radio.plans.is_empty() {
-        true => "Tasks: transition (amber), imaging with success (green) or without (red), waiting (grey).",
-        false => {
-            "Tasks: transition (amber), imaging with success (green) or without (red), waiting (grey). Above them \
-             passes (blue), below them imaging as the ground had predicted it (purple)."
-        }
-    };
+    let mut timeline =
+        "Tasks: transition (amber), imaging with success (green) or without (red), waiting (grey).".to_owned();
+    if !story.radio.passes.is_empty() || !story.radio.plans.is_empty() {
+        timeline += " Above them passes (blue), below them imaging as the ground had predicted it (purple).";
+    }
     for (id, title, svg) in [
         ("map", map, figures::map(story)?),
-        ("timeline", timeline, figures::timeline(story)?),
+        ("timeline", &*timeline, figures::timeline(story)?),
         ("attitude", "Attitude error.", figures::attitude_error(story)?),
         ("wheel-speed", "Speeds of the wheels.", figures::wheels(story, speed.0, speed.1, speed.2)?),
         ("wheel-torque", "Torques of the wheels.", figures::wheels(story, torque.0, torque.1, torque.2)?),
